@@ -42,11 +42,12 @@ _MEND = "all written files are complete; run the same command again to continue"
 
 
 class OtherCodeError(Exception):
-    """A worker has another camtool than the client; the text names its version."""
+    """The worker's camtool is not the client's; the text is the version of the worker's."""
 
 
 class ClusterPool:
-    """The workers of the scheduler at `address` for one Work; `note` shows a message."""
+    """Workers of the Dask scheduler at `address` for one BatchWork; `note` shows a message to the
+    user."""
 
     def __init__(self, work: BatchWork, address: str, note: Callable[[str], None]) -> None:
         self._work = work
@@ -137,7 +138,8 @@ class _SentDrawings:
 
 
 class _Workers:
-    """The workers of the cluster; each one's camtool is compared before it gets a drawing."""
+    """The workers of the cluster. Before a worker gets its first drawing, its camtool is compared
+    with the client's."""
 
     def __init__(self, client: Client, order: _Order, note: Callable[[str], None]) -> None:
         self._client = client

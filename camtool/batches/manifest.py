@@ -26,10 +26,10 @@ NAME = ".camtool-batch.jsonl"
 
 
 class ManifestEntry(Struct, frozen=True):
-    """One drawing: `key`, the digest of everything that its outputs depend on, and the digests of
-    its outputs by name; `earlier` has those of outputs that the last run did not make again, such
-    as programs for another machine. A drawing that failed has its `error` and the `code` of the
-    finding that is it, and no files."""
+    """The record of one drawing. `key`: digest of everything that its outputs depend on; `files`:
+    digests of its outputs by name; `earlier`: digests of outputs that the last run did not make
+    again, such as programs for another machine. A drawing that failed has its `error`, the `code`
+    of the finding that was the error, and no files."""
 
     key: str
     files: Mapping[str, str]
@@ -48,7 +48,7 @@ class ManifestEntry(Struct, frozen=True):
 
 
 class Manifest:
-    """The entries of an output folder by stem."""
+    """The entries of an output folder, by stem (output name without extension)."""
 
     def __init__(self, folder: Path) -> None:
         self._out = folder

@@ -42,9 +42,10 @@ class DrawingTask:
 
 @dataclass(frozen=True, kw_only=True)
 class DrawingResult:
-    """One drawing in the summary: `remarks` are its findings, one line each, errors first;
-    `figures` a few numbers; `verdicts` the counts of inspected dimensions by verdict; `code` the
-    code of the finding that is the error, "" for other errors; `findings` the worst of them."""
+    """The entry of one drawing in the summary. `remarks`: its findings, one line each, errors
+    first; `figures`: a few numbers; `verdicts`: counts of inspected dimensions by verdict; `code`:
+    the code of the finding that is the error, "" for other errors; `findings`: the worst of its
+    findings."""
 
     error: str | None = None
     remarks: tuple[str, ...] = ()
@@ -58,9 +59,9 @@ class DrawingResult:
 
 @dataclass(frozen=True)
 class Outputs(DrawingResult):
-    """The outputs of a drawing: `files` by extension, none when there is an `error`; `content` is
-    the digest of the bytes of the drawing, "" where another run may end otherwise with the same
-    drawing and job."""
+    """The outputs of a drawing. `files`: content by extension, empty if there is an `error`;
+    `content`: digest of the drawing's bytes, "" if another run with the same drawing and job may
+    give another result."""
 
     content: str = ""
     files: Mapping[str, bytes] = field(default_factory=dict)
@@ -81,7 +82,8 @@ class BatchWork(Protocol):
 
 
 class Pool(Protocol):
-    """Workers that turn tasks into results in any order, with None after a while without any."""
+    """Workers that turn tasks into results, in any order; while no result is ready, None is
+    yielded now and then."""
 
     def results(
         self, tasks: Sequence[DrawingTask]
@@ -100,8 +102,9 @@ class OutcomeState(StrEnum):
 
 @dataclass(frozen=True)
 class Outcome(DrawingResult):
-    """The outcome of one drawing; `files` are relative to the output folder; `remembered`: it
-    failed in an earlier run, and nothing that it depends on has changed since."""
+    """The outcome of one drawing. `files` are relative to the output folder; `remembered`: it
+    failed in an earlier run, and nothing that it depends on has changed since, so it was not tried
+    again."""
 
     source: str
     stem: str
@@ -122,10 +125,10 @@ to be up to date."""
 
 @dataclass(frozen=True)
 class BatchSettings:
-    """Settings of a batch: the output folder `out` and the function `write`; the digests of
-    everything that outputs depend on besides the drawing (`base` for all, `own` for each task by
-    stem); `force` makes all outputs again, and replaces files that no batch made; `retries` tries
-    drawings again that failed and did not change."""
+    """Settings of a batch: the output folder `out` and the function `write`; digests of everything
+    that outputs depend on besides the drawing (`base` for all drawings, `own` for each by stem).
+    `force`: make all outputs again, and replace files that no batch made; `retries`: also try
+    drawings that failed and have not changed."""
 
     out: Path
     write: Writer

@@ -62,7 +62,7 @@ class Regions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RegionsOf(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The cells of each axis, if there are any."""
+    """The regions of X and of Y, None for an axis without regions."""
 
     x: Regions | None = None
     y: Regions | None = None

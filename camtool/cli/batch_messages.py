@@ -35,7 +35,7 @@ COLOUR = {
 
 
 class Display(Protocol):
-    """A display of outcomes."""
+    """A display of the outcomes of a batch."""
 
     def begin(self) -> None:
         """Begin the display; called when the first drawing that is not up to date is begun."""
@@ -69,7 +69,7 @@ def display(total: int, verbosity: Verbosity) -> Iterator[Display]:
 
 
 class LineDisplay:
-    """A line for each drawing."""
+    """A display with one line for each drawing."""
 
     def __init__(self, total: int, verbosity: Verbosity) -> None:
         self._total = total
@@ -94,8 +94,9 @@ class LineDisplay:
 
 
 class BarDisplay:
-    """A bar with rate and time left, from the first drawing that is not up to date. Errors appear
-    above it on one line each, and in full in the table."""
+    """A progress bar with rate and remaining time, which appears with the first drawing that is
+    not up to date. Errors are printed above it on one line each, and in full in the table at the
+    end."""
 
     def __init__(self, total: int, verbosity: Verbosity) -> None:
         self._total = total

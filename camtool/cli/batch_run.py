@@ -53,8 +53,8 @@ EXIT_SIGNAL = 128
 
 @dataclass(frozen=True)
 class RunSettings:
-    """Settings of a run: local processes or a cluster, the limits, and whether everything is made
-    again, or what failed."""
+    """Settings of a run: local processes or a cluster, the limits, and whether all drawings are
+    made again, or those that failed."""
 
     jobs: int | None
     scheduler: str | None
@@ -66,8 +66,8 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class BatchFlags:
-    """Job and tolerances of drawings that have none beside them; whether the files beside them
-    count (`own`), and whether dimensions are inspected at all."""
+    """Job and tolerances for drawings that have none beside them. `own`: files beside drawings
+    count; `inspects`: dimensions are inspected."""
 
     job: JobFlags
     inspection: InspectionFlags
@@ -77,8 +77,9 @@ class BatchFlags:
 
 @dataclass(frozen=True)
 class OrderedTasks:
-    """Tasks with their jobs and tolerances, a text that identifies these (by stem), the drawings
-    whose own job or tolerances are wrong, and all files beside drawings that are read."""
+    """Tasks with their jobs and tolerances; by stem a text that identifies these, as a part of the
+    key in the manifest; the drawings whose own job or tolerances are wrong; and all files beside
+    drawings that are read."""
 
     tasks: list[DrawingTask]
     own: dict[str, str]
@@ -112,7 +113,7 @@ class LazyPool:
 
 @dataclass(frozen=True)
 class BatchRun:
-    """A run of the command."""
+    """A run of `camtool batch`."""
 
     work: PostWork
     out: Path

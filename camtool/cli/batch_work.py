@@ -43,9 +43,8 @@ SVG = ".svg"
 
 @dataclass(frozen=True)
 class JobOrder:
-    """The job of one drawing; `file` is the name of its file. `asked` has the dimensions of its
-    file of tolerances, None for those of the drawing alone; nothing is inspected unless
-    `inspects`."""
+    """The job of one drawing; `file`: the name of its file. `asked`: the dimensions of its file of
+    tolerances, None for only those in the drawing; `inspects`: dimensions are inspected at all."""
 
     job: Job
     file: str | None
@@ -55,9 +54,9 @@ class JobOrder:
 
 @dataclass(frozen=True)
 class PostWork:
-    """Post one drawing as `camtool post` does; `preview` is an extension, None for no picture;
-    `looks` has the options of pictures; `require` is the required verdict of inspected
-    dimensions."""
+    """The work of a batch: post each drawing as `camtool post` does. `preview`: extension of the
+    picture, None for none; `looks`: options of pictures; `require`: the verdict that inspected
+    dimensions must have."""
 
     target: LoadedTarget
     drawing: DrawingFlags

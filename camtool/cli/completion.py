@@ -120,7 +120,7 @@ complete --no-files --command %(prog_name)s --arguments "(%(complete_func)s)"
 
 
 class _Shell(ShellComplete):
-    """A shell that passes its line up to the cursor."""
+    """A shell whose script passes the command line up to the cursor."""
 
     def get_completion_args(self) -> tuple[list[str], str]:
         """Return the finished words after the command, and the one that is being typed."""

@@ -224,7 +224,7 @@ def init(
 
 
 class Questions:
-    """Questions to the user at a terminal; none unless they are `allowed`."""
+    """Questions to the user at a terminal; if not `allowed`, every answer is None."""
 
     def __init__(self, allowed: bool) -> None:
         self.allowed = allowed

@@ -32,7 +32,8 @@ _QUIET = ("-q", "--quiet")
 
 
 class LifeSigns:
-    """A status line on `stream` about a `progress`, with the time since `counting` began."""
+    """A status line on `stream` about a `progress`, with the time since `counting` began; other
+    threads may print above it."""
 
     def __init__(self, stream: TextIO | None, progress: Progress) -> None:
         self.progress = progress

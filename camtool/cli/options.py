@@ -192,8 +192,8 @@ _MACHINE = "Machine"
 
 
 class MachineFlags(Struct, frozen=True):
-    """`--target`, `--machine` (a file), `--set`; `by_default` if a `camtool.toml` names the
-    machine, and no flag does."""
+    """The values of `--target`, `--machine` (a file) and `--set`. `by_default`: a `camtool.toml`
+    names the machine, and no flag does."""
 
     target: str | None
     machine: str | None
@@ -441,8 +441,8 @@ _OF_READING = "read_"
 
 
 class DrawingFlags(Struct, frozen=True):
-    """Patterns that select what is read (`--layer` to `--line-type`), and fields of ReadOptions,
-    None for flags that are not given."""
+    """Flags of reading drawings: patterns that select what is read (`--layer` to `--line-type`),
+    and fields of ReadOptions, None for flags that are not given."""
 
     given: Mapping[str, Any] = field(default_factory=dict)
 
@@ -539,8 +539,8 @@ ReadJob = Callable[["Table"], "Job"]
 
 
 class JobFlags(Struct, frozen=True, dict=True):
-    """`--job`, `--operation`, `--setup` and the flags that set the same keys as a job; `given` has
-    the values of those that were given. `project`: the defaults of the project."""
+    """The values of `--job`, `--operation` and `--setup`, and in `given` those of the flags for
+    keys of the job, as far as given. `project`: the defaults of the project."""
 
     file: str | None = None
     operations: tuple[str, ...] = ()

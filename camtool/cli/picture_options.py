@@ -48,8 +48,8 @@ def picture_name(ctx: click.Context, param: click.Parameter, value: str | None) 
 
 
 class Canvas(Struct, frozen=True):
-    """The possible content of a command's pictures: moves of a machine or a drawing alone; with
-    the predicted path or without; in layers or without. `more` says what would allow the rest."""
+    """What the pictures of a command can show: `moves` of a machine or only a drawing; the
+    `predicted` path; several layers (`layered`). `more`: text on what would allow the rest."""
 
     more: str = ""
     moves: bool = True
@@ -256,8 +256,8 @@ CLOSEUP = "closeup.svg"
 
 
 class Painter(Struct, frozen=True, dict=True):
-    """Draw the pictures of a command from the scenes that `make` returns when the first picture is
-    requested; several stand side by side."""
+    """Draws the pictures of a command, from the scenes that `make` returns when the first picture
+    is requested; several scenes stand side by side."""
 
     make: Callable[[], Sequence[Scene]]
     flags: PictureFlags

@@ -258,7 +258,7 @@ def _confirm() -> bool:
 
 @dataclass
 class _Sending:
-    """The sending of one program: the requests of the user, and the display."""
+    """The sending of one program, with the requests of the user and the display."""
 
     program: str
     one: Consignment

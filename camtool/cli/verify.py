@@ -247,8 +247,8 @@ class VerifyOutputs(Struct, frozen=True):
 
 
 class VerifySettings(Struct, frozen=True, eq=False):
-    """The settings of judging programs: the machine, the criteria, the drawing; `finding`: for
-    programs by others it is found which contours they cut."""
+    """The settings of judging programs: the machine, the criteria, the drawing. `finding`: the
+    contours that a program cuts are found from the program itself, for programs by others."""
 
     target: LoadedTarget
     judging: Judging

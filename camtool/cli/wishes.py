@@ -76,12 +76,12 @@ pipe at its input is closed: by camtool, or because camtool was killed."""
 
 
 class AtStop:
-    """The answer to a program that waits for an operator (M0, a tool change) where none is asked:
-    "fail" stops the machine, any other text is a command of the shell. The program goes on when
-    the command ends with exit code 0, and the machine is stopped when it ends with another.
+    """The answer to a program that waits for an operator (M0, a tool change) when nobody is there.
+    "fail" stops the machine; any other text is a shell command: the program goes on if it ends
+    with exit code 0, and the machine is stopped otherwise.
 
-    The command has the reason in its environment (`CAMTOOL_WHY`), never in its text: that comes
-    from the program's comments.
+    The command gets the reason in its environment (`CAMTOOL_WHY`), never in its text, since it
+    comes from the program's comments.
     """
 
     def __init__(self, command: str) -> None:
@@ -138,8 +138,8 @@ class AtStop:
 
 
 class UserRequests:
-    """Return the next request each time it is called, None without one. `key` returns the pressed
-    key, and `keys` maps it to a request; interrupts within `one_s` count as one."""
+    """A function that returns the next request of the user, None without one. `key` returns the
+    pressed key, and `keys` maps it to a request; interrupts within `one_s` count as one."""
 
     def __init__(
         self,
@@ -239,7 +239,8 @@ def takes_more(stream: TextIO | None) -> bool:
 
 
 class Messages:
-    """Messages on stderr while a machine works; messages for which there is no room are kept."""
+    """Messages on stderr while a machine works. A message that stderr does not take at once is
+    kept."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet, self._waiting = quiet, list[str]()

@@ -91,8 +91,8 @@ _ANY_BOX = partial(KeepOutBox, name="", x_mm=(0.0, 1.0), y_mm=(0.0, 1.0))
 
 
 class JobTables(Struct, frozen=True):
-    """The tables of a job as a file gives them, or flags. `defaults` hold for all `operations`;
-    None are the operations of the other source."""
+    """The tables of a job, from a file or from flags. `defaults` hold for all `operations`;
+    `operations` None: those of the other source apply."""
 
     whole: Table = field(default_factory=Table)
     place: Table = field(default_factory=Table)

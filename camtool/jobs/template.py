@@ -73,7 +73,8 @@ _WIDTH = 36
 
 
 class _Group(Struct, frozen=True):
-    """Paths and marks that one operation takes: the rows of both, and the pattern for them."""
+    """Paths and marks of one layer or colour: its `name`, the `key` that selects it ("layers" or
+    "colours"), and the rows of paths and marks."""
 
     name: str
     key: str

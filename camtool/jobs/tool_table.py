@@ -27,8 +27,8 @@ _WHOLE = re.compile(r"\d+")
 
 
 class TableTool(Struct, frozen=True):
-    """A line of the table: the tool's `number`; its `diameter` in the table's unit, None without a
-    D; the `remark` as it stands; the number of the `line`."""
+    """A line of the tool table: the `number` of the tool; its `diameter` in the table's unit, None
+    without a D; the `remark`; the number of the `line`."""
 
     number: int
     diameter: float | None

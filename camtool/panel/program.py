@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 
 class BlockFacts(Struct, frozen=True):
-    """A block of a program that runs: its `number` (from 1), where it ends, its feed (None for a
-    rapid or no motion) and the speed of the spindle, 0 while that stands."""
+    """Facts about the block that runs: its `number` (from 1), its end, its feed (None for a rapid
+    or no motion) and the speed of the spindle, 0 if it stands."""
 
     number: int = 0
     end_mm: Place | None = None
@@ -36,7 +36,7 @@ class BlockFacts(Struct, frozen=True):
 
 
 class Course:
-    """The course of what is sent: its blocks, and the time that remains."""
+    """The progress of what is sent: its blocks, and the remaining time."""
 
     def __init__(self, one: Consignment) -> None:
         self.one = one
@@ -88,8 +88,8 @@ class Course:
 
 
 class LoadedProgram(Struct, frozen=True, eq=False):
-    """A program that was read and judged; `file` names it. `tool_mm`: diameter of its end mill,
-    with which the picture shows the stock; None: not known."""
+    """A program that was read and judged. `file`: its name; `tool_mm`: diameter of its end mill,
+    with which the picture shows the stock, None if not known."""
 
     file: str
     data: bytes

@@ -59,7 +59,8 @@ _TYPES: Final = {"html": "text/html", "css": "text/css", "js": "text/javascript"
 
 
 class JogRequest(Struct, frozen=True, tag="jog", tag_field="do", forbid_unknown_fields=True):
-    """Move by so much, mm, at a feed in mm/min; with `held`, in a direction until released."""
+    """Jog by these distances, mm, at a feed in mm/min; with `held`, in this direction until
+    released."""
 
     feed: float
     x: float = 0.0
@@ -69,7 +70,7 @@ class JogRequest(Struct, frozen=True, tag="jog", tag_field="do", forbid_unknown_
 
 
 class KeepRequest(Struct, frozen=True, tag="keep", tag_field="do", forbid_unknown_fields=True):
-    """The key of a held jog is still down."""
+    """Confirm that the key of a held jog is still down."""
 
 
 class GoRequest(Struct, frozen=True, tag="go", tag_field="do", forbid_unknown_fields=True):
@@ -94,9 +95,9 @@ class LoadRequest(Struct, frozen=True, tag="load", tag_field="do", forbid_unknow
 
 
 class TouchRequest(Struct, frozen=True, tag="touch", tag_field="do", forbid_unknown_fields=True):
-    """Touch a plate of this `thickness`, an edge, corner or bore, or the skew of a side `along` so
-    many mm, with a tip of this `diameter`, in the direction `towards` ("x+", "x-y+"); no more than
-    `reach` away, at `feed`."""
+    """Touch a plate of this `thickness`, an edge, a corner or a bore, or measure the skew of a
+    side over the length `along`, with a tip of this `diameter`, in the direction `towards` ("x+",
+    "x-y+"), at most `reach` away, at `feed`; mm and mm/min."""
 
     what: Literal["plate", "edge", "corner", "bore", "skew"]
     towards: str = ""
@@ -110,11 +111,11 @@ class TouchRequest(Struct, frozen=True, tag="touch", tag_field="do", forbid_unkn
 class ReleaseRequest(
     Struct, frozen=True, tag="release", tag_field="do", forbid_unknown_fields=True
 ):
-    """The key of a held jog has been let go."""
+    """End a held jog: its key was released."""
 
 
 class ZeroRequest(Struct, frozen=True, tag="zero", tag_field="do", forbid_unknown_fields=True):
-    """The place of the tool becomes part zero of these axes."""
+    """Make the place of the tool part zero of these axes."""
 
     axes: str
 
@@ -126,7 +127,7 @@ class OrderRequest(Struct, frozen=True, tag="order", tag_field="do", forbid_unkn
 
 
 class LineRequest(Struct, frozen=True, tag="line", tag_field="do", forbid_unknown_fields=True):
-    """A typed line."""
+    """Type a line to the controller."""
 
     text: str
 
@@ -134,16 +135,16 @@ class LineRequest(Struct, frozen=True, tag="line", tag_field="do", forbid_unknow
 class ChangeRequest(
     Struct, frozen=True, tag="override", tag_field="do", forbid_unknown_fields=True
 ):
-    """An override, %."""
+    """Set an override, %."""
 
     name: Override
     percent: int
 
 
 class StartRequest(Struct, frozen=True, tag="start", tag_field="do", forbid_unknown_fields=True):
-    """Send the program: `single`: block by block; `first`: from this block on (from 1); `resumes`:
-    where the journal says that it was left, with the tool as `tool_at` says; `more`: behind a
-    stop; `despite_errors`: although it has findings that spoil the part."""
+    """Send the program. `single`: block by block; `first`: from this block on (from 1); `resumes`:
+    from where its journal says that it was left, with the tool as `tool_at` says; `more`: after a
+    stop, with the same journal; `despite_errors`: even with findings that spoil the part."""
 
     single: bool = False
     tool_at: ToolAt = ""
@@ -200,8 +201,8 @@ _DECODER: Final = msgspec.json.Decoder(Wanted)
 
 
 class Client:
-    """A page that is open; `shown` is the number of the last message that it has, `edition` that
-    of the program."""
+    """An open page. `shown`: number of the last message that it has; `edition`: that of the
+    program it shows."""
 
     def __init__(self, socket: web.WebSocketResponse) -> None:
         self.socket, self.shown, self.edition = socket, 0, -1

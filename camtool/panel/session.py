@@ -69,16 +69,16 @@ class MachineState(Struct, frozen=True):
     """State of the machine, as far as it is known.
 
     `state`: "closed" without a line, otherwise the state of the conversation; `why`: what it waits
-    for, or why it has ended; `says`: the state in the controller's word; `place_mm`: as it reports
-    it or as it is counted, in the work frame, `machine_mm`: from machine zero; `is_homed`: that is
-    known, and the travel is watched, whose ends in the work frame are `travel_mm`; the feed, the
-    step rate of the fastest axis and the speed of the spindle; `overrides` in %.
+    for, or why it ended; `says`: the state in the controller's own word. `place_mm`: in the work
+    frame, as reported or counted; `machine_mm`: from machine zero; `is_homed`: that is known, so
+    that the travel is watched, whose ends in the work frame are `travel_mm`. The feed, the step
+    rate of the fastest axis, and the spindle speed; `overrides` in %.
 
-    Of a program: `sent`, `acknowledged`, `done` packets, the bytes `buffered` that are not
-    acknowledged, the `block` that was acknowledged last (from 1; 0 for none), where the one that
-    is cut ends, `programmed_mm`, and the time `left_s`. `stops`: it waits at a stop for the user,
-    as for another tool; `change_first`: it was left there to touch off, and goes on with this
-    block (0: no).
+    Of a program: the numbers of packets `sent`, `acknowledged` and `done`; the bytes `buffered`
+    that are not acknowledged; the `block` that was acknowledged last (from 1; 0 for none); the end
+    `programmed_mm` of the block that runs; the remaining time `left_s`. `stops`: it waits at a
+    stop for the user, for example for another tool; `change_first`: it was left there to touch
+    off, and resumes with this block (0: it was not).
     """
 
     state: str = "closed"
@@ -105,7 +105,7 @@ class MachineState(Struct, frozen=True):
 
 
 class StepRate:
-    """The rate of counted steps, by the places of the last `RATE_S`."""
+    """The rate of counted steps, from the places within the last `RATE_S`."""
 
     def __init__(self, step_mm: tuple[float, ...], speed: float) -> None:
         self._step_mm, self._speed = step_mm, speed
@@ -130,9 +130,9 @@ class StepRate:
 
 
 class Session:
-    """A machine at its port. `open_line` opens and locks the port for the length of a `with`;
-    `watch`, which may be set later, is called in the session's thread when the state has changed
-    or a message has come."""
+    """A machine at its port. `open_line` opens and locks the port within a `with` block; `watch`,
+    which may be set later, is called in the session's thread when the state has changed or a
+    message has come."""
 
     def __init__(
         self,

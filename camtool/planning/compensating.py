@@ -86,7 +86,7 @@ def motor_path(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
 
 
 class _ToolpathMapper:
-    """A toolpath mapped by the matrix."""
+    """Maps a toolpath by a matrix (3, 3)."""
 
     def __init__(self, toolpath: Toolpath, matrix: Floats, tolerance_mm: float) -> None:
         self._toolpath, self._matrix, self._tolerance_mm = toolpath, matrix, tolerance_mm
@@ -171,8 +171,8 @@ def _add_event(builder: ToolpathBuilder, move: Move, toolpath: Toolpath) -> None
 
 
 class _Drive(Struct):
-    """An axis in motion: where the controller stands, and in which direction ±1 it went last;
-    `residual` is that of the region that the tool is in."""
+    """The state of an axis: the position that the controller commands, and the direction ±1 of its
+    last move; `residual`: that of the region in which the tool is."""
 
     axis: Axis
     residual: Residual

@@ -33,9 +33,9 @@ class Feeds(Struct, frozen=True):
 
 
 class Setting(Struct, frozen=True):
-    """An operation with what the machine adds to it: feeds; `levels_mm`, the z of its passes,
-    downwards, the last at the full depth; `safe_z_mm` above the stock top (z = 0); `spindle_rpm`,
-    None: off or unknown; the `stock` as far as the job gives it."""
+    """An operation with the numbers that the machine adds: feeds; `levels_mm`, the z of its
+    passes, downwards, the last at the full depth; `safe_z_mm` above the stock top (z = 0);
+    `spindle_rpm`, None if off or unknown; the `stock` as far as the job gives it."""
 
     operation: Operation
     feeds: Feeds
@@ -46,11 +46,11 @@ class Setting(Struct, frozen=True):
 
 
 class CutRun(Struct, frozen=True, eq=False):
-    """`vertices` (n, 4) of x, y, z, bulge in mm, work frame, n ≥ 1; the bulge belongs to the move
-    that leaves its vertex (with a change of z it is a helix); `feed_mm_min` (n−1,), RAPID (NaN)
-    for a rapid. The tool comes down from safe z to the first vertex at the plunge feed of
-    `plunge_mm_min`, and up from the last one as a rapid. `name` is the provenance of its moves,
-    `dwell_s` is spent at the last vertex."""
+    """One stay of the tool in the stock. `vertices` (n, 4) x, y, z, bulge, mm, work frame, n ≥ 1;
+    the bulge belongs to the move that leaves its vertex (with a change of z it is a helix);
+    `feed_mm_min` (n − 1,), RAPID (NaN) for a rapid. The tool comes down from safe z to the first
+    vertex at `plunge_mm_min`, and goes up from the last one as a rapid. `name`: the source of its
+    moves; `dwell_s`: a dwell at the last vertex."""
 
     vertices: Floats
     feed_mm_min: Floats
@@ -69,11 +69,11 @@ class CutRun(Struct, frozen=True, eq=False):
 
 
 class Runs(Struct, frozen=True, eq=False):
-    """R runs in columns; each of them is made when it is asked for.
+    """R runs in columns; single ones are made when asked for.
 
-    Run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices` (N, 4), and of `feed_mm_min`
-    (N,), whose value behind the last vertex of a run is that of no move; `plunge_mm_min`,
-    `dwell_s` (R,) and the `names` (R) as of a CutRun. ValueError for a vertex that is not finite.
+    Run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices` (N, 4) and of `feed_mm_min`
+    (N,), in which the last value of a run is unused; `plunge_mm_min`, `dwell_s` (R,) and `names`
+    (R) are as in a CutRun. ValueError for a vertex that is not finite.
     """
 
     vertices: Floats
@@ -144,11 +144,11 @@ NO_STARTS.flags.writeable = False
 class Contour(Struct, frozen=True, eq=False):
     """A path of the tool centre, to be cut at all levels of its setting.
 
-    `path` runs as it is to be cut unless `reversible`. `starts`: the vertices of a closed path at
-    which it may begin; empty: any that is no joint within an arc. `source`: the index of its path
-    in the placed drawing. `material_left`: what is to stay lies to the left of the path as it
-    runs; False: to the right; None: on both sides (engraved). `outline`: the closed path that this
-    one is a part of, for the nesting; None: the path itself.
+    `path` runs as it must be cut, unless `reversible`. `starts`: the vertices at which a closed
+    path may begin; empty: any vertex that is no joint within an arc. `source`: the index of its
+    path in the placed drawing. `material_left`: the material that stays lies to the left of the
+    path; False: to the right; None: on both sides (engraved). `outline`: for the nesting, the
+    closed path of which this is a part; None: the path itself.
     """
 
     path: Polyline
@@ -164,8 +164,9 @@ class Contour(Struct, frozen=True, eq=False):
 class Fixed(Struct, frozen=True, eq=False):
     """Runs that are cut one after the other as they are: a pocket, a hole, a carved letter.
 
-    `outline`: a closed path around it, when there is one, for the nesting. `centre_lines`: lines
-    of the tool's centre that bound a slot beside a contour, which holds what lies within it.
+    `outline`: for the nesting, a closed path around them, if there is one. `centre_lines`: lines
+    of the tool's centre that bound a slot beside a contour; the slot holds what lies within that
+    contour.
     """
 
     runs: tuple[CutRun, ...]
@@ -197,7 +198,7 @@ def contours_along(
 
 
 class Work(Struct, frozen=True, eq=False):
-    """The items that an operation made of its paths, and its findings."""
+    """The items that an operation made of its paths, and findings."""
 
     items: Items
     findings: tuple[Finding, ...] = ()
@@ -213,10 +214,11 @@ class Air(Struct, frozen=True, eq=False):
 
 class Chosen(Struct, frozen=True, eq=False):
     """The paths that an operation takes, in the work frame: `lines` with their `nesting`; `source`
-    (M,), the index of each in the placed drawing; `names` for people; `points` (K, 2) mm, the
-    marks of its layers, with their `point_names`. `rim` (M,): whether a closed path is the rim of
-    a part, what lies within it staying, or of a hole. `file`: that of the drawing. `air`: what
-    operations before have cleared, for those that ask for it (`Operation.engagement_rad`)."""
+    (M,), the index of each in the placed drawing; `names`, for messages; `points` (K, 2), mm, the
+    marks of its layers, with their `point_names`. `rim` (M,): True if a closed path is the edge of
+    a part, so that its inside stays, False for the edge of a hole. `file`: that of the drawing.
+    `air`: what operations before have cleared, for operations that need it
+    (`Operation.engagement_rad`)."""
 
     nesting: Nesting
     source: Ints
@@ -234,9 +236,9 @@ class Chosen(Struct, frozen=True, eq=False):
 
 
 class Bridge(Struct, frozen=True, eq=False):
-    """The bridge that a tab leaves: `centre` (2,), `ahead` (2,) the direction of its contour
-    there, half its width, half the width of the slot that it spans, mm; its top; `fall` as of its
-    tab; the name of its contour."""
+    """The bridge of material that a tab leaves: its `centre` (2,); `ahead` (2,), the direction of
+    its contour there; half its width, and half the width of the slot that it spans, mm; its top;
+    `fall`, the slope of its sides, as in Tab; the name of its contour."""
 
     centre: Floats
     ahead: Floats
@@ -248,9 +250,9 @@ class Bridge(Struct, frozen=True, eq=False):
 
 
 class Step(Struct, frozen=True, eq=False):
-    """An operation as planned: its setting, what it took, its items, the runs in order of
-    cutting with the item that each is of, `owner` (R,), how far rapids go in XY: as drawn, and as
-    ordered, mm; and the bridges that its tabs leave."""
+    """An operation as planned: its setting; what it took; its items; the runs in order of cutting,
+    with the item (R,) that each belongs to (`owner`); the length of rapids in XY in drawn order
+    and as ordered, mm; and the bridges of its tabs."""
 
     operation: Operation
     setting: Setting

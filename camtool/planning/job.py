@@ -270,15 +270,15 @@ def _refuse_beyond(key: str, lengths: tuple[float, float], min_mm: float, max_mm
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Tool(FrozenRecord):
-    """A tool; diameter 0 is a point that cuts no width. A V bit and a drill have a
-    `tip_angle_rad`, the full angle of the cone, and a V bit may have a flat tip; a bull nose has
-    a `corner_radius_mm`.
+    """A tool; one of diameter 0 is a point that cuts no width. A V bit and a drill have a
+    `tip_angle_rad`, the full angle of the cone, and a V bit may have a flat tip; a bull nose has a
+    `corner_radius_mm`.
 
-    What is not known is None: how many `flutes` it has, how long they cut (`cutting_length_mm`),
-    and whether it cuts at its centre, and so plunges. Above its flutes it is a cylinder, the
-    shank, up to the holder: a cylinder too, from `stickout_mm` above the tip on and
-    `holder_length_mm` long (None: endless). Limits of the feed per tooth, mm, and of the speed of
-    the cutting edge, m/min, are (least, most). `materials`: those of its presets.
+    Unknown values are None: the number of `flutes`, their length (`cutting_length_mm`), and
+    whether it cuts at its centre, and so can plunge. Above its flutes it is a cylinder, the shank,
+    up to the holder: a cylinder too, from `stickout_mm` above the tip on and `holder_length_mm`
+    long (None: endless). Limits of the feed per tooth, mm, and of the cutting speed, m/min, are
+    (least, greatest). `materials`: those for which it has presets.
     """
 
     diameter_mm: float = 0.0
@@ -389,8 +389,8 @@ class Tool(FrozenRecord):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Entry(FrozenRecord):
-    """The way down of the tool; a ramp or helix slopes by `angle_rad`, a helix has `radius_mm`
-    (None: as large as fits, half the tool's at most)."""
+    """The way of the tool down into the stock; a ramp or helix slopes by `angle_rad`, a helix has
+    `radius_mm` (None: as large as fits, up to half the tool's radius)."""
 
     kind: str = "plunge"
     angle_rad: float = 0.05235987755982988  # 3 degrees
@@ -409,8 +409,8 @@ class Entry(FrozenRecord):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Lead(FrozenRecord):
-    """The way to a contour or away from it: a line along its tangent of `length_mm`, or a quarter
-    arc of that radius."""
+    """The way of the tool to a contour or away from it: a line of `length_mm` along its tangent,
+    or a quarter arc of that radius."""
 
     kind: str = "none"
     length_mm: float = 1.0
@@ -422,10 +422,9 @@ class Lead(FrozenRecord):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Tabs(FrozenRecord):
-    """Bridges that hold a part: so many (`count`), one each `spacing_mm`, or next to these places
-    (x, y) mm of the work frame (`at_mm`); `width_mm` of
-    material at the top of a tab, `height_mm` above the bottom of the cut; `ramped` or straight
-    sides."""
+    """Bridges that hold a part: `count` of them, or one every `spacing_mm`, or next to the places
+    `at_mm` (x, y) of the work frame; `width_mm` of material at the top of a tab, `height_mm` above
+    the bottom of the cut; sides `ramped` or straight."""
 
     count: int | None = None
     spacing_mm: float | None = None

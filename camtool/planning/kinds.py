@@ -152,7 +152,7 @@ class OperationKind(FrozenRecord):
 
 
 class _Broken(Struct, frozen=True):
-    """A kind whose plug-in cannot be loaded: where it is from, and why not."""
+    """A kind of operation that cannot be loaded: its entry point, and the reason."""
 
     value: str
     reason: str

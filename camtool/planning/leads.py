@@ -48,9 +48,9 @@ class KeepOut(Struct, frozen=True, eq=False):
 
 
 class Border(Struct, frozen=True, eq=False):
-    """The limits of leads: `line`, the contour, with the tool free on its left or right
-    (`free_left`; None: nowhere); and `keep_out`, with the distance `reach_mm` to stay away, and
-    besides `allowance_mm` from what is the operation's own, which may be below 0."""
+    """The limits of a contour's leads: `line`, the contour, with the tool free on its left or
+    right (`free_left`; None: nowhere); `keep_out`, from which they stay `reach_mm` away, and
+    `allowance_mm` (possibly negative) farther from the operation's own lines."""
 
     line: Polyline
     free_left: bool | None
@@ -112,8 +112,8 @@ class Border(Struct, frozen=True, eq=False):
 
 
 class Leads(Struct, frozen=True, eq=False):
-    """The lead-in and lead-out of a contour, (k, 3) x, y, bulge, k = 0 or 2, both with the place
-    at the contour; and what did not fit."""
+    """The lead-in and the lead-out of a contour, (k, 3) x, y, bulge, k = 0 or 2, each including
+    the place at the contour; and findings about leads that did not fit."""
 
     way_in: Floats
     way_out: Floats

@@ -214,8 +214,8 @@ def _set_coolant(builder: ToolpathBuilder, coolant_now: str, wanted_coolant: str
 
 
 class _Lot(Struct, frozen=True, eq=False):
-    """A part of the runs, from run `first` on; `is_begun`: its first run began in the lot before;
-    `goes_on`: its last run continues in the next lot, from the vertex with which this one ends."""
+    """A part of the runs, from run `first` on. `is_begun`: its first run began in the lot before;
+    `goes_on`: its last run continues in the next lot, from the vertex at which this one ends."""
 
     runs: Runs
     first: int

@@ -59,8 +59,8 @@ enough to be a line, far shorter than any tool is wide."""
 
 class Choices(Struct, frozen=True, eq=False):
     """The variants in which M items may be cut, one row each: `owner` (S,), the item, ascending
-    from 0, none left out; `entry`, `exit` (S, 2) mm, where the tool goes down and where it comes
-    up. The first row of an item is as it is drawn. ValueError for other arrays."""
+    from 0, none left out; `entry`, `exit` (S, 2), mm, where the tool goes down and comes up. The
+    first row of an item is as it is drawn. ValueError for other arrays."""
 
     owner: Ints
     entry: Floats

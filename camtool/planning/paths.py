@@ -32,8 +32,8 @@ SLOPE_EPS = 1e-9
 
 class MeasuredPaths:
     """Paths in columns with the lengths along them: `lines`, their `segments`, and the `tracks` of
-    camtool.kernels.passes, which know the `reach` mm to the start of each segment and to the end
-    of each path. It gives the single ones in turn, each a `MeasuredPath`."""
+    camtool.kernels.passes, which know the `reach`, mm, to the start of each segment and to the end
+    of each path. Iterating gives a `MeasuredPath` for each."""
 
     def __init__(self, lines: Polylines) -> None:
         self.lines, self.segments = lines, Segments.of(lines)

@@ -280,8 +280,8 @@ def carved_levels(
     the bit). Under its tip the earlier one has cut d less deep than its own depth, so that the tip
     takes 2 d: passes after the first are no deeper than half the step down.
 
-    >>> carved_levels(0.9, 0.3, None)
-    (-0.3, -0.45, -0.6, -0.75, -0.9)
+    >>> [round(z, 6) for z in carved_levels(0.9, 0.3, None)]
+    [-0.3, -0.45, -0.6, -0.75, -0.9]
     """
     even_levels = levels(depth_mm, step_down_mm, last_pass_mm)
     passes = list(even_levels[:1])

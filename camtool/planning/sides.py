@@ -67,12 +67,12 @@ class Seen(Struct, frozen=True, eq=False):
 
 
 class Sides(Struct, eq=False, dict=True):
-    """The M contours of a placed drawing, those that were not chosen after those that were, and
-    their sides. `names`: layer and source of each. `takes` (K, M): what each of the `operations`
-    takes of them; `cuts` (K, M): the same, but of a bore the circles alone. (M,) each: `worked`,
-    what any of them cuts along or clears; `edges`, what is drawn as an edge that is seen;
-    `framed`, what is on the layer of a frame.
-    `default_depth_mm`: the depth of operations that give none."""
+    """The M contours of a placed drawing and their sides; contours that were not chosen come after
+    those that were. `names`: layer and source of each. `takes` (K, M): the mask of what each of
+    the `operations` takes of them; `cuts` (K, M): the same, but for a bore only the circles. Masks
+    (M,): `worked`, what any operation cuts along or clears; `edges`, what is drawn as a visible
+    edge; `framed`, what is on the layer of a frame. `default_depth_mm`: the depth of operations
+    that give none."""
 
     nesting: Nesting
     names: tuple[str, ...]

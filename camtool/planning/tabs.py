@@ -95,8 +95,8 @@ BRIDGE_SLACK_MM = 1e-4
 
 
 class Tab(Struct, frozen=True):
-    """A bridge: over the lengths `begin` to `end` the tool is at `top_mm` or higher, and to both
-    sides the height falls by `fall` mm per mm (infinite: straight down)."""
+    """A tab on a path: from the length `begin` to `end` the tool is at `top_mm` or higher, and on
+    both sides the height falls by `fall` mm per mm (infinite: vertically)."""
 
     begin: float
     end: float
@@ -377,7 +377,7 @@ class _Corners(Struct, frozen=True, eq=False):
 
 class _Fitting(Struct, frozen=True, eq=False):
     """The conditions under which tabs like the `model`, with slopes of `foot_mm`, fit on a path;
-    half the width of the bridge under them, mm."""
+    `half_width_mm`: half the width of the bridge under them."""
 
     along: MeasuredPath
     model: Tab
@@ -593,7 +593,8 @@ def raised_over_bridges(
 
 
 class _RaisedBridges:
-    """The bridges over which runs were raised, and those that a drill goes through."""
+    """The bridges over which runs were raised, and those that a drill goes through, collected for
+    findings."""
 
     def __init__(self) -> None:
         self.shared: dict[int, tuple[Bridge, str]] = {}

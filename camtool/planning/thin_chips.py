@@ -65,8 +65,8 @@ def without_peaks(level: Ints, lengths_mm: Floats, least_mm: float) -> Ints:
 
 
 class FeedStretches(Struct, frozen=True, eq=False):
-    """Stretches of a path with one feed on one line or arc: their first chords (P,), and their
-    feeds (P,)."""
+    """Stretches of a path with one feed on one line or arc: the first chord (P,) and the feed (P,)
+    of each."""
 
     first: Ints
     feed_mm_min: Floats

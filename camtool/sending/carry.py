@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 
 class SendOptions(Struct, frozen=True):
-    """`single`: wait behind every block; `home`, `unlock`: first; `speed`: ratio of the machine's
-    clock to real time; `journal`: its file, which is appended to with `more`; `file`: where the
-    program lies, for controllers that open it."""
+    """Options of sending. `single`: wait after every block; `home`, `unlock`: do this first;
+    `speed`: ratio of the machine's clock to real time; `journal`: its file, to which `more`
+    appends; `file`: path of the program, for controllers that open it themselves."""
 
     journal: Path
     single: bool = False

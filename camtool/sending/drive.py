@@ -54,7 +54,7 @@ class LineToController(Protocol):
 
 
 class Record(Protocol):
-    """Storage of counts (`camtool.sending.journal.Journal`)."""
+    """Storage of the counts of a conversation (`camtool.sending.journal.Journal`)."""
 
     def note(self, place: Place | None = None, **counts: object) -> None: ...
 
@@ -69,7 +69,7 @@ def _no_wish() -> Request | Order | None:
 
 @dataclass
 class Driver:
-    """Carry a conversation over a line to its end. `speed`: ratio of the conversation's clock to
+    """Carries a conversation over a line to its end. `speed`: ratio of the conversation's clock to
     real time, for virtual machines with the same ratio."""
 
     line: LineToController

@@ -40,10 +40,10 @@ Point = tuple[float, float, float]
 
 
 class JournalState(Struct, frozen=True):
-    """The state in a journal: digests of the program and of the machine, the target, the first
-    block that is not done for certain (from 0), and True if the program is finished; the last
-    block that was sent (−1: none), the place of the tool (mm, None if unknown) and True if it is
-    known to stand there."""
+    """The state in a journal: digests of the program and of the machine; the target; the first
+    block (from 0) that is not surely done; True if the program is finished; the last block that
+    was sent (−1: none); the place of the tool (mm, None if unknown), and True if it is known to
+    stand there."""
 
     sha256: str
     machine: str

@@ -126,8 +126,8 @@ class TcpPort:
 
 
 class Clock:
-    """Seconds of the machine: `speed` times real seconds; None: it jumps to the next event as soon
-    as no client sends anything."""
+    """Clock of the virtual machine, s: `speed` times real time. `speed` None: it jumps to the next
+    event whenever no client sends anything."""
 
     def __init__(self, speed: float | None) -> None:
         self.speed = speed

@@ -22,7 +22,7 @@ from camtool.toolpath.moves import Toolpath
 
 
 class FusedRun(Protocol):
-    """A fused run: it is judged row by row as it is simulated, without chunks."""
+    """A run of a program that is judged row by row while it is simulated, without chunks."""
 
     @property
     def rows(self) -> int:
@@ -34,7 +34,7 @@ class FusedRun(Protocol):
 
 
 class ControllerModel(ABC, Generic[ControllerT, DialectT]):
-    """The arithmetic of one controller."""
+    """The model of one kind of controller: how it rounds, interpolates and times moves."""
 
     samples_per_speed: ClassVar[int] = 16
     """A speed is measured over this many samples: steps of several axes come in turns, and one

@@ -24,8 +24,8 @@ from camtool.toolpath.moves import Kind, Toolpath
 
 
 class Legs(Struct, frozen=True, eq=False):
-    """L legs, each of which starts where the one before ends: `row` (L,) of the toolpath,
-    ascending; `steps` (L, 3) of the axes, with sign, none of them all 0; `seconds` (L,)."""
+    """L straight legs, each of which starts where the one before ends: `row` (L,) of the toolpath,
+    ascending; `steps` (L, 3) of the axes with sign, not all 0; `seconds` (L,)."""
 
     row: Ints
     steps: Ints
@@ -33,8 +33,8 @@ class Legs(Struct, frozen=True, eq=False):
 
 
 class LegProgram(Struct, frozen=True, eq=False):
-    """The data of all R rows up to the end of the program: `start` (3,) steps; `waits` (R,) s
-    of rows without motion; `compensation_s`, the time of each step added at a reversal."""
+    """Data of all R rows up to the end of the program: `start` (3,), steps; `waits` (R,), s, of
+    rows without motion; `compensation_s`, the time of each step added at a reversal."""
 
     start: Ints
     waits: Floats
@@ -45,7 +45,7 @@ _NO_STEPS = np.zeros((0, 3), dtype=np.int64)
 
 
 class LegRun:
-    """A run of legs on a machine."""
+    """The motion of legs on a machine."""
 
     def __init__(self, program: LegProgram, machine: Machine, options: Options) -> None:
         self._standing, self._position = program, program.start

@@ -30,9 +30,9 @@ REVERSAL_STEPS = 0.5
 
 
 class _Varied(Struct, frozen=True):
-    """Further arguments of `play_varied_fill`: the backlash (3,) mm of the axes, and the cells
-    that replace it; the position of machine zero (3,) mm; the shares of the backlash on either
-    side; the scatter (3,) mm and its seed."""
+    """Additional arguments of `play_varied_fill`: the backlash (3,), mm, of the axes, and the
+    cells that replace it by region; the position of machine zero (3,), mm; the shares of the
+    backlash on either side; the scatter (3,), mm, and its seed."""
 
     backlash: Floats
     cells: tuple[PlayCells | None, ...]

@@ -132,9 +132,10 @@ CHUNK_STEPS = 1 << 16
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Options(FrozenRecord):
-    """`interpolator` replaces the controller's own for arcs; only the `effects` act; a chunk has
-    at most `chunk_steps` samples. Without `rapids`, of moves that cut nothing those may be missing
-    between the places where an axis turns: judging needs none of them."""
+    """Options of a simulation. `interpolator` replaces the controller's own for arcs; only the
+    `effects` act; a chunk has at most `chunk_steps` samples. Without `rapids`, samples of moves
+    that cut nothing may be left out between the places where an axis reverses, since judging does
+    not need them."""
 
     interpolator: str | None = None
     effects: Effects = ALL

@@ -87,7 +87,7 @@ def row_seconds(blocks: Iterable[SampledRows], rows: int) -> Floats:
 
 
 class SampledModel(ControllerModel[ControllerT, DialectT]):
-    """A controller whose motion is the samples of its rows."""
+    """A controller whose motion is given by samples of its rows."""
 
     @abstractmethod
     def sampled(

@@ -30,7 +30,8 @@ LINES_AT_ONCE = 1024
 
 class LineRows(Struct, frozen=True, eq=False):
     """The rows low:high of a program: `seconds` (high − low,) of each, and the B lines of whole
-    steps: `row` (B,) ascending, `start` and `travel` (B, 3) steps, none without a step."""
+    steps: `row` (B,), ascending, `start` and `travel` (B, 3), steps. Every line has at least one
+    step."""
 
     low: int
     high: int

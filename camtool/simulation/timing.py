@@ -19,8 +19,9 @@ from camtool.toolpath.moves import Toolpath
 
 
 class TimedChunk(Struct, frozen=True, eq=False):
-    """The samples (K,) of a chunk with their times from the start of the program, s: each is
-    reached at `at_s`, and is the motion from `begin_s` to `end_s`; `at_s` is one of both."""
+    """The samples (K,) of a chunk with times from the start of the program, s. A sample is reached
+    at `at_s` and stands for the motion from `begin_s` to `end_s`; `at_s` equals one of these two.
+    """
 
     chunk: Chunk
     at_s: Floats

@@ -39,7 +39,8 @@ MAX_REMAINING_SQUARES = 200_000
 
 
 class SetupCut(Struct, frozen=True, eq=False):
-    """The cuts of a set-up: its name, its moves with their index, and the map into its frame."""
+    """The cuts of another set-up: its name, its moves with their index, and the map into its
+    frame."""
 
     name: str
     moves: StockMoves

@@ -111,11 +111,11 @@ MIN_CHORDS = 48
 
 
 class StockRequest(Struct, frozen=True, eq=False):
-    """The solid that a job asks for, its closed contours, and which of them (C,) are the outlines
-    of parts without tabs; its operations that cut, in their order, each with its depth, mm, and
-    the bridges of its tabs; the boxes that are to be kept free, the stock, what set-ups before
-    have cut of it, and the nets of `copper` that are to be freed. `is_whole`: nothing else has cut
-    before: passes, and what is left, can be judged."""
+    """What a job asks of the stock: the solid; its closed contours, and the mask (C,) of those
+    that are outlines of parts without tabs; its operations that cut, in order, with the depth of
+    each, mm, and the bridges of its tabs; the keep-out boxes; the stock; what earlier set-ups have
+    cut of it (`before`); and the nets of `copper` that must be freed. `is_whole`: the program is
+    the only one of its set-up, so that passes, and what is left, can be judged."""
 
     solid: WantedSolid
     contours: Polylines

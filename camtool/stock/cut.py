@@ -164,8 +164,8 @@ def cut_box(moves: StockMoves) -> Box:
 class StockDifference(Struct, frozen=True):
     """The difference of two stocks.
 
-    `deeper`, `shallower`: the greatest distance, mm, by which the second cuts where the first does
-    not, and the reverse, each with its place; `more_mm3`, `less_mm3`: the volumes of these.
+    `deeper`: the greatest distance, mm, by which the second cuts where the first does not, with
+    its place; `shallower`: the reverse. `more_mm3`, `less_mm3`: the volumes of both.
     """
 
     deeper: Bracket

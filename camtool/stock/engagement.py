@@ -95,9 +95,10 @@ class Engagement(Struct, frozen=True, eq=False):
 
 
 class OperationEngagement(Struct, frozen=True):
-    """The greatest engagement of an operation outside of entries, rad (None: it was not judged, by
-    `reason`), the place of that (x, y) mm and the row of the program; the limit that the operation
-    itself has, None for none. The `name` is "" where the operations of a program are not known."""
+    """The greatest engagement of an operation outside of entries, rad (None: it was not judged,
+    for the `reason`), with its place (x, y), mm, and the row of the program; and the limit that
+    the operation itself sets (None: no limit). `name` is "" if the operations of a program are not
+    known."""
 
     name: str
     greatest_rad: float | None

@@ -85,8 +85,8 @@ def move_columns(moves: StockMoves) -> Floats:
 
 
 class Bracket(Struct, frozen=True):
-    """The greatest value of a function over a region: at least `low`, which it has at `at_mm`, and
-    at most `high`. `squares`: how many were looked at."""
+    """The greatest value of a function over a region: at least `low`, which it reaches at `at_mm`,
+    and at most `high`. `squares`: the number of squares that were examined."""
 
     low: float
     high: float

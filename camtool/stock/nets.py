@@ -48,8 +48,8 @@ WIDTH_ROUNDS = 12
 
 
 class NetFault(Struct, frozen=True):
-    """Nets that are joined, or one that is cut apart (`other` is None) or cut away (`pieces` 0):
-    their numbers, and a place (x, y) mm."""
+    """A fault of nets (by number) at a place (x, y), mm: two nets that are joined, or one that is
+    cut apart (`other` None) or cut away entirely (`pieces` 0)."""
 
     net: int
     other: int | None
@@ -58,7 +58,7 @@ class NetFault(Struct, frozen=True):
 
 
 class Width(Struct, frozen=True):
-    """The narrowest place of something, mm, and where it is."""
+    """The width of a narrowest place, mm, and its position."""
 
     width_mm: float
     at_mm: tuple[float, float]

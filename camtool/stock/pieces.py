@@ -74,8 +74,8 @@ class LoosePiece(Struct, frozen=True, eq=False):
 
 
 class LoosePieces(Struct, frozen=True, eq=False):
-    """The pieces that come loose, in the order of time. Those within cuts narrower than
-    `seen_mm` are not looked for; the narrowest cut is `narrowest_mm` wide."""
+    """The pieces that come loose, in the order of time. Pieces within cuts narrower than `seen_mm`
+    are not found; the narrowest cut is `narrowest_mm` wide."""
 
     pieces: list[LoosePiece]
     seen_mm: float = 0.0
@@ -83,7 +83,7 @@ class LoosePieces(Struct, frozen=True, eq=False):
 
 
 class _Level(Struct, frozen=True, eq=False):
-    """The cuts that go through the stock where its floor is at a height, mm, and the number of
+    """The cuts that go through the stock where its floor is at this height, mm, and the index of
     each among all moves."""
 
     floor_mm: float
@@ -186,8 +186,8 @@ WIDTH_STEP_MM = 1e-3
 
 
 class _Raster(Struct, frozen=True, eq=False):
-    """The cuts of each level, what other set-ups have cut, and the box and the cells in which
-    pieces are looked for."""
+    """The cuts through the stock by level, what other set-ups have cut, and the box and cell size
+    of the raster in which pieces are searched."""
 
     levels: list[_Level]
     before: StockBefore

@@ -240,7 +240,8 @@ class _Chords(Struct, frozen=True, eq=False):
 
 
 class Gouges:
-    """The moves of a program, and what they may cut."""
+    """The moves of a program, and the layers that they may cut, for proofs that nothing is
+    gouged."""
 
     def __init__(
         self,
@@ -421,7 +422,8 @@ def _allows(layer: WantedLayer, chords: _Chords, table: Floats, distance_mm: flo
 
 
 class Leftovers:
-    """The stock after a program, and what must be cut of it."""
+    """The stock after a program, and the layers that must be cut, for proofs that nothing
+    is left."""
 
     def __init__(
         self,

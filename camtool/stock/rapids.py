@@ -140,7 +140,8 @@ def _fed_depths(toolpath: Toolpath, is_across: Bools) -> Floats:
 
 
 class _Search:
-    """The R rapids of a program that may touch the stock: their parts below its top."""
+    """The search among the R rapids of a program that may touch the stock; only their parts below
+    its top count."""
 
     def __init__(
         self,

@@ -29,7 +29,7 @@ THIN_STEPS = 1.0
 
 
 class ToolsOfRows(Struct, frozen=True, eq=False):
-    """The different cutters of a program, and the index of that of each of its N rows."""
+    """The distinct cutters of a program, and for each of its N rows the index of its cutter."""
 
     cutters: tuple[CutterProfile, ...]
     index: Ints

@@ -94,8 +94,9 @@ POINT_MM = 2e-6
 
 
 class WantedLayer(Struct, frozen=True, eq=False, dict=True):
-    """A region that one operation may cut, or must: a depth by the distance s from `lines`, mm,
-    counted inwards of their `side` and increased by `shift_mm`. `name`: that of the operation."""
+    """A region that one operation may, or must, cut: a depth that depends on the distance s from
+    `lines`, mm, which is counted inwards on their `side` and increased by `shift_mm`. `name`: that
+    of the operation."""
 
     name: str
     lines: Polylines
@@ -188,8 +189,8 @@ class WantedLayer(Struct, frozen=True, eq=False, dict=True):
 
 
 class WantedSolid(Struct, frozen=True, eq=False):
-    """The layers of what may be cut and of what must be, and the width of the band beside walls
-    in which nothing is judged, mm."""
+    """The layers that may be cut, the layers that must be cut, and the width of the band beside
+    walls in which nothing is judged, mm."""
 
     may: tuple[WantedLayer, ...]
     must: tuple[WantedLayer, ...]

@@ -41,8 +41,8 @@ class NoDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TwinKind(NamedTuple):
-    """The virtual controllers of a target: the record of what the sources of its wire leave open,
-    whose defaults are ours, and the class that is made with a machine and this record."""
+    """The virtual controllers of a target: the record of the choices that the sources of its wire
+    leave open (with our defaults), and the class that is made from a machine and this record."""
 
     settings: type[Struct]
     make: Callable[[Any, Any], Twin]
@@ -53,9 +53,9 @@ NEAR_RATIO = 1e-6
 
 
 class ControllerSetting(Struct, frozen=True):
-    """A value of a machine file that a controller's own settings say: its key, such as
-    "axes.x.travel_mm", what says it, such as "$130", and where that stands. `doubt`: why it is no
-    value of this machine; it becomes a comment of the file then."""
+    """A value of a machine file from a controller's own settings: its key, such as
+    "axes.x.travel_mm"; the setting that says it, such as "$130"; and where that stands. `doubt`:
+    why it may not be a value of this machine; it is then written as a comment."""
 
     key: str
     value: float | int | str | Sequence[str]
@@ -65,8 +65,8 @@ class ControllerSetting(Struct, frozen=True):
 
 
 class OpenKey(Struct, frozen=True):
-    """A key of a machine file that a sample program leaves open: the question, our answer, and
-    what else it may be, () for anything. `is_list`: the file has a list of such values."""
+    """A key of a machine file that a sample program leaves open: the question to ask, our default,
+    and the possible answers, () for any. `is_list`: the file has a list of such values."""
 
     key: str
     question: str
@@ -76,7 +76,7 @@ class OpenKey(Struct, frozen=True):
 
 
 class SampledDialect(Struct, frozen=True):
-    """What a sample program says of its dialect, and what it leaves open."""
+    """What a sample program reveals of its dialect, and the questions that it leaves open."""
 
     settings: tuple[ControllerSetting, ...]
     questions: tuple[OpenKey, ...]

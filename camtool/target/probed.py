@@ -14,11 +14,11 @@ NEVER_CLOSED = -1e6
 
 
 class ProbedPart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A part that closes the probe; all places are those of the machine as it is when the power
-    comes on, mm. `probe_mm`: its top; `probe_slope_x`, `probe_slope_y`: how much higher that is
-    for each mm of X and Y (a blank that lies aslant). `probe_block`: "X0,Y0,X1,Y1", its sides
-    ("": it has none), turned by `probe_turn_deg` about X0 Y0; `probe_round`: "X,Y,DIAMETER" of a
-    boss instead; `probe_bore`: the same of a bore in it. `probe_radius`: that of the tip."""
+    """A part that closes the probe of a virtual machine. All places are those of the machine when
+    the power comes on, mm. `probe_mm`: its top; `probe_slope_x`, `probe_slope_y`: how much higher
+    that is for each mm of X and Y (a tilted blank). `probe_block`: its sides "X0,Y0,X1,Y1" ("":
+    none), turned by `probe_turn_deg` about X0 Y0; `probe_round`: a boss "X,Y,DIAMETER" instead;
+    `probe_bore`: a bore in it, likewise. `probe_radius`: the radius of the tip."""
 
     probe_mm: float = NEVER_CLOSED
     probe_slope_x: float = 0.0

@@ -70,9 +70,10 @@ def choices_of(record: type[msgspec.Struct]) -> Iterator[tuple[str, str]]:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class LoadedTarget(FrozenRecord):
-    """A machine and its target. `file` is the target's own machine file, `table` its values with
-    those of the user, `base` those without (None: they are all in `file`). `placeholders`: which
-    numbers are examples of no particular machine, since the user has given no others."""
+    """A machine and its target. `file`: the target's own machine file; `table`: its values with
+    those of the user; `base`: without those of the user (None: they are all in `file`).
+    `placeholders`: the numbers that are examples of no particular machine, since the user has
+    given no others."""
 
     machine: Machine
     target: Target

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 class Coils(Struct, frozen=True):
     """A motor whose coils are the bits of `port` from `shift` on: `lines`, their names from the
-    lowest one; `states`, the values of these bits in the order of a positive move. A step is
-    `states_per_step` of them. `at_start`: on the first state, or without current until the first
-    move, which then begins with the first state of its direction."""
+    lowest one; `states`, the values of these bits in the order of a positive move;
+    `states_per_step`, the number of these in a step. `at_start`: the first state is on, or there
+    is no current until the first move, which then begins with the first state of its direction."""
 
     name: str
     port: str

@@ -18,8 +18,8 @@ MAX_LINE_BYTES = 1000
 
 
 class Terminal:
-    """A controller that is spoken to in lines and answers in lines; a target with words of its own
-    overrides what it knows better."""
+    """A controller that takes and answers lines; a target overrides what it knows better about its
+    own."""
 
     end: ClassVar[bytes] = b"\n"
     """End of a typed line."""

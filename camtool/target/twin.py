@@ -50,10 +50,10 @@ class TwinTrace(Struct, frozen=True, eq=False):
 
 
 class Travel(Struct, frozen=True, eq=False):
-    """Outputs to come, K positions (K, 3) mm in order: `seconds` (K,), ascending, from its
-    begin until each; `added_s` (K,), what one step of compensation in front of it would take;
-    `total_s` with what is waited behind the last; `left_at` (3,): where the controller then takes
-    itself to stand, where that is not the last of them."""
+    """Outputs to come, K positions (K, 3), mm, in order: `seconds` (K,), ascending, the time from
+    the begin of the travel to each; `added_s` (K,), the time that one step of compensation before
+    it would take; `total_s`, the time with the wait after the last; `left_at` (3,): the position
+    that the controller then believes in, if that is not the last one."""
 
     commanded: Floats
     seconds: Floats
@@ -91,7 +91,7 @@ def travel_of(chunks: Iterable[Chunk], *, by_passes: bool = False) -> Travel:
 
 
 class Slides:
-    """The slides of a machine: what they are to do next, and what they have done."""
+    """The slides of a machine: the travel they are to make, and the movements they have made."""
 
     def __init__(self, machine: Machine[Any, Any]) -> None:
         self.commanded_mm: Floats = np.zeros(3)

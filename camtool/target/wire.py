@@ -51,10 +51,10 @@ HandAction = Literal["home", "zero", "jog", "hold", "unlock", "line"]
 
 
 class Forecast(Struct, frozen=True, eq=False):
-    """Simulated course of the B blocks of a program: `decoded`, the moves; `seconds` (B,) of each
-    with its compensation, `compensation_s` (B,) the part of it for compensation; `outputs` (B,) of
-    steps, each of one axis or several, `steps` (B, 3) of the axes, `reversals` (B, 3) of them, and
-    where each ends, `end_mm` (B, 3)."""
+    """The simulated course of the B blocks of a program: `decoded`, its moves; `seconds` (B,), the
+    time of each block, and `compensation_s` (B,), the part of it for compensation; `outputs` (B,)
+    of steps, each of one axis or several; `steps` and `reversals` (B, 3) of the axes; and the end
+    of each block, `end_mm` (B, 3)."""
 
     decoded: Toolpath
     seconds: Floats
@@ -83,12 +83,12 @@ class Forecast(Struct, frozen=True, eq=False):
 class Packet(Struct, frozen=True):
     """Bytes that are sent in one piece and acknowledged as one.
 
-    `block`: the last block of the program that is done when it is done, −1 before the first;
-    `seconds`: how long the machine is busy with it, by the simulation. `counts`: how many reports
-    of it the controller may give, where it gives any. `ask`: what the user must do or allow before
-    it goes out. `note`: what the user must know while the machine waits in it; `waits`: true if
-    the program waits there until somebody lets it go on. `end_mm`: where it ends, in the work
-    frame, where the conversation looks at that.
+    `block`: the last block of the program that is done with it, −1 before the first; `seconds`:
+    the time for which the machine is busy with it, by the simulation. `counts`: the greatest
+    number of reports that the controller gives of it, if it reports. `ask`: what the user must do
+    or allow before it is sent. `note`: what the user must know while the machine waits in it;
+    `waits`: the program waits there until somebody resumes it. `end_mm`: its end in the work
+    frame, if the conversation checks that.
     """
 
     data: bytes
@@ -127,7 +127,7 @@ class Write(Struct, frozen=True):
 
 
 class Reopen(Struct, frozen=True):
-    """The port is to be closed and opened again, since the controller begins anew."""
+    """Close the port and open it again, since the controller starts anew."""
 
 
 class Tell(Struct, frozen=True):
@@ -155,11 +155,11 @@ and rounding."""
 
 
 class ResumePoint(Struct, frozen=True, eq=False):
-    """Point at which an interrupted program goes on, by its journal. `place_mm`: the place of the
-    tool, None where that is not known; `is_still`: it was known to stand there; `ends_mm` (K, 3):
-    where it may stand otherwise, having done what it had. `tool_at`: what the user says: the tool
-    stands at the place of the "journal", or at part "zero", and the controller is to take it so;
-    or the controller's own place is "known" to be right; "" for nothing."""
+    """The point at which an interrupted program resumes, from its journal. `place_mm`: the place
+    of the tool, None if not known; `is_still`: it was known to stand there; `ends_mm` (K, 3):
+    other places where it may stand, depending on how much was done. `tool_at`: what the user says:
+    the tool stands at the place in the "journal", or at part "zero", and the controller must adopt
+    that; or the controller's own place is "known" to be right; "" for nothing."""
 
     place_mm: Place | None
     is_still: bool
@@ -210,15 +210,15 @@ def place_words(place_mm: Place | None) -> str:
 
 
 class Manner(Struct, frozen=True):
-    """Options of a conversation. `single`: it waits for `resume` after every packet; `home`: the
-    machine is homed first; `unlock`: a controller that is locked is unlocked first; `late_s`: how
-    late the line may be, s; `checked`: settings of the controller are compared with the machine
-    file; `paced`: each byte takes the time that the rate of the line gives it, so that a reply
-    that comes sooner is none; `file`: where what is sent lies, for controllers that open it by
-    themselves; `standing`: where the program was left that goes on, for controllers that say where
-    they are; `at_mm`: where the tool stands now in the frame of the controller, as far as the user
-    or an earlier order says it; `reach_mm`: the lowest and the highest place of what is sent, in
-    the work frame, for those that watch over their travel."""
+    """Options of a conversation. `single`: wait for `resume` after every packet; `home`: home the
+    machine first; `unlock`: unlock a locked controller first; `late_s`: the greatest delay of the
+    line, s; `checked`: compare the controller's settings with the machine file; `paced`: bytes
+    take the time that the line's rate gives them, so that a reply that comes sooner is not one;
+    `file`: path of what is sent, for controllers that open it themselves; `standing`: where a
+    resumed program was left, for controllers that report their place; `at_mm`: where the tool
+    stands now in the controller's frame, as far as known from the user or an earlier order;
+    `reach_mm`: the lowest and the highest place of what is sent, in the work frame, for
+    conversations that watch the travel."""
 
     single: bool = False
     home: bool = False
@@ -238,8 +238,8 @@ class Manner(Struct, frozen=True):
 
 
 class Conversation(ABC):
-    """Conversation that sends packets; see above. `place_mm`: position that the controller
-    reports, in the work frame, None where it does not say."""
+    """A conversation that sends packets; see the module. `place_mm`: the position that the
+    controller reports, in the work frame, None if it reports none."""
 
     def __init__(self, packets: Sequence[Packet], manner: Manner) -> None:
         self.packets = tuple(packets)
@@ -368,9 +368,9 @@ class Conversation(ABC):
 
 
 class PacketByPacket(Conversation):
-    """A conversation in which a packet goes out when the one before is done.
+    """A conversation that sends a packet when the one before is done.
 
-    Pauses are between packets, and so is a stop, unless `_halt` can do more.
+    It pauses between packets, and also stops there unless `_halt` can do more.
     """
 
     stands = "stopped: it has done what it was sent, and stands"
@@ -544,8 +544,8 @@ class Hand(Conversation):
 
 
 class SettingsConversation(Conversation):
-    """A controller that is asked for its settings, and takes changes of them. `before`, `after`:
-    its listings; `written`: the changes that it has taken."""
+    """A conversation that reads a controller's settings and changes them. `before`, `after`: its
+    listings; `written`: the changes that it has accepted."""
 
     before: Sequence[str] = ()
     after: Sequence[str] = ()
@@ -555,8 +555,8 @@ class SettingsConversation(Conversation):
 class CommandHand(Hand):
     """A machine moved by the commands of its wire: each order is a conversation of its own.
 
-    Where the controller reports no place, the place is where the session has begun, plus what was
-    counted, or what orders that were carried out have moved.
+    If the controller reports no place, the place is that at the begin of the session, plus the
+    steps counted or the distances of the orders carried out since.
     """
 
     def __init__(self, wire: Wire, machine: Machine[Any, Any], manner: Manner) -> None:
@@ -726,7 +726,7 @@ SILENT_S = 1.5
 
 
 class TypedLine(Conversation):
-    """A line typed to a controller, and its answers."""
+    """A conversation about one line typed to a controller, and its answers."""
 
     def __init__(self, terminal: Terminal, line: str, manner: Manner) -> None:
         super().__init__((), manner)
@@ -781,7 +781,7 @@ class TypedLine(Conversation):
 
 class Wire(ABC):
     """The protocol of one controller. `baud` and `frame` (data bits, parity, stop bits) are those
-    of a serial port; `baud` None: not known. `ready` says what the user must see to beforehand."""
+    of a serial port; `baud` None: not known. `ready`: what the user must see to before sending."""
 
     baud: ClassVar[int | None] = None
     frame: ClassVar[str] = "8N1"
@@ -914,7 +914,7 @@ def port_fault(error: Exception) -> tuple[str, str]:
 
 
 class NoWire(Struct, frozen=True):
-    """A machine to which camtool sends nothing: `why`, and what does instead, `mend`."""
+    """A machine to which camtool cannot send: `why`, and what to use instead (`mend`)."""
 
     why: str = "the protocol of its line is not among those that can be sent"
     mend: str = "send the program as the machine's own programs do"

@@ -100,15 +100,16 @@ class VerifyOptions(Struct, frozen=True):
 
 
 class Case(Struct, frozen=True, eq=False):
-    """A program to judge, its machine, and what it is compared with; None for what there is not.
+    """A program to judge, its machine, and what it is compared with; fields that do not apply are
+    None.
 
     `decoded`: the moves that the controller reads from the program. `wanted`: the moves that it
     should make; both are in the work frame. `drawing`, in that frame too, gives its findings.
-    `compensated`: the moves that the program should contain where `wanted` is compensated against
-    the mechanics. `asked`: what else the job asks for, as a program of the dialect.
-    `written_from`: the moves from which the program was written: contours must have the same
-    direction; `row_from` (N,): the row of these from which each decoded row was written, −1 for
-    none. `registration`: the parts of the drawing that a program of others cuts.
+    `compensated`: the moves that the program should contain if `wanted` is compensated against the
+    mechanics. `asked`: what else the job asks for, as a program of the dialect. `written_from`:
+    the moves from which the program was written, whose contours it must cut in the same direction;
+    `row_from` (N,): the row of these from which each decoded row was written, −1 for none.
+    `registration`: the parts of the drawing that a program of others cuts.
     """
 
     decoded: Toolpath

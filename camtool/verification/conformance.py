@@ -76,9 +76,10 @@ from camtool.verification.nearest import MoveIndex
 
 
 class Conformance(Struct, frozen=True, eq=False):
-    """The result: findings on where is cut (`place`) and on feeds, spindle and the like
-    (`settings`); the number of cutting `moves`, how many of them are `alike` in `written`, and the
-    largest distance `off_mm` of the others from what was asked (0 where there are none)."""
+    """The result of the comparison: findings on where the program cuts (`place`), and on feeds,
+    spindle and other settings (`settings`); the number of cutting `moves`, the number of them that
+    are equal in `written` (`alike`), and the largest distance `off_mm` of the others from what was
+    asked (0 if there are none)."""
 
     place: tuple[Finding, ...] = ()
     settings: tuple[Finding, ...] = ()
@@ -194,8 +195,9 @@ def _numbers(toolpath: Toolpath) -> Ints:
 
 
 class PlaceComparison(Struct, frozen=True, eq=False):
-    """Findings; the largest distance of a cut from what was asked, mm; `pairs` (P, 2): decoded
-    rows that are not in `written`, each with a written row on which it lies, in its direction."""
+    """The result of comparing places: findings; the largest distance of a cut from what was asked,
+    mm; `pairs` (P, 2): decoded rows that are not in `written`, each with a written row that it
+    lies on, in the same direction."""
 
     findings: tuple[Finding, ...]
     off_mm: float

@@ -81,7 +81,7 @@ class Coverage(Struct, frozen=True, eq=False):
 
 
 class Side(Struct, frozen=True, eq=False, dict=True):
-    """A toolpath that is compared with another: its cutting moves, and what is derived from it."""
+    """One of two toolpaths that are compared: its cutting moves, and what is derived from them."""
 
     toolpath: Toolpath
     cuts: CutMoves
@@ -509,8 +509,9 @@ _EXTRA_HOLES = EXTRA_CUT_HOLE, EXTRA_CUT_HOLE_DEPTH
 
 
 class HoleComparison(Struct, frozen=True, eq=False):
-    """The contours of a program that are `drilled` holes of the wanted side (C,), the wanted
-    contours that are holes of the program, `undrilled` (W,), and findings on all other holes."""
+    """The mask `drilled` (C,) of contours of the program that are holes of the wanted side, the
+    mask `undrilled` (W,) of wanted contours that are holes of the program, and findings on all
+    other holes."""
 
     drilled: Bools
     undrilled: Bools

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 
 class ProgramSlides(Struct, frozen=True, eq=False, dict=True):
-    """A program of a job (None: no job is known): the cutters of its rows, and the moves of its
-    simulated slides, which are made once."""
+    """A program and its job (None: not known): the cutters of its rows, and the moves of its
+    simulated slides, which are computed once."""
 
     case: Case
     job: Job | None
@@ -61,8 +61,8 @@ class ProgramSlides(Struct, frozen=True, eq=False, dict=True):
 
 
 class EngagementJudged(Struct, frozen=True, eq=False):
-    """The greatest engagement of each operation, None where nobody asks for it; and the findings
-    of its limits."""
+    """The greatest engagement of each operation (None if nothing limits it), and the findings
+    about its limits."""
 
     rows: tuple[OperationEngagement, ...] | None = None
     findings: tuple[Finding, ...] = ()

@@ -35,7 +35,7 @@ PIECES_GUESSED = 500
 
 
 class Figure:
-    """Maximum, rms and 95th percentile of errors ≥ 0, mm; all NaN without any error."""
+    """Maximum, rms and 95th percentile of errors ≥ 0, mm; all NaN if there are no errors."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -145,8 +145,8 @@ def _first_at_least(count_wanted: int, guess: int, count: Callable[[int], int]) 
 
 
 class RowBlock(Struct, frozen=True, eq=False):
-    """The columns (R, 19) of `camtool.kernels.judging` of the rows from `low` on, in mm and XY;
-    `is_cut` (R,): which of them cut."""
+    """The columns (R, 19) of `camtool.kernels.judging` for the rows from `low` on, mm, in XY;
+    `is_cut` (R,): the mask of rows that cut."""
 
     low: int
     columns: Floats
@@ -264,9 +264,9 @@ def _larger_error(previous: float, errors: Floats) -> float:
 
 
 class LedgerSums:
-    """The ledgers of all chunks: `seconds` (N,) of each row, `ended` (N,) False for rows whose
-    stop test was never met, `endless` the places in XY (mm) where these were left; the rest is
-    summed up, and kept by row only with `keep_ledger`: `ledger` of N rows, `samples` (N,)."""
+    """The ledgers of all chunks, summed up: `seconds` (N,) of each row, `ended` (N,), False for
+    rows whose stop test was never met, and `endless`, the places in XY (mm) where these were left.
+    Other columns are kept by row only with `keep_ledger`: `ledger` of N rows, `samples` (N,)."""
 
     def __init__(self, count: int, *, keep_ledger: bool = False) -> None:
         self.ledger = still_ledger(np.arange(count)) if keep_ledger else None
@@ -432,8 +432,8 @@ class WorstRows:
 
 
 class MissedEnds:
-    """The number of moves that the controller leaves beside their ends, and the row (−1 for none)
-    and the distance (mm) of the farthest; of several the first."""
+    """The number of moves that the controller leaves beside their programmed ends, with the row
+    (−1: none) and the distance (mm) of the farthest; of equal ones the first."""
 
     def __init__(self) -> None:
         self.count, self.row, self.most_mm = 0, -1, 0.0

@@ -34,15 +34,16 @@ ANY_CONTOUR = -1
 
 
 class NearestMoves(Struct, frozen=True, eq=False):
-    """(J,) distance mm, inf where no move is found, and (J,) segment, −1 there."""
+    """The nearest move to each of J points: `distance` (J,), mm, inf if none was found, and
+    `segment` (J,), −1 then."""
 
     distance: Floats
     segment: Ints
 
 
 class MoveIndex:
-    """Cutting moves, to be searched by place, contour and height; its tables are made by the first
-    search."""
+    """Cutting moves, indexed for searches by place, contour and height; the tables are made by the
+    first search."""
 
     def __init__(self, cuts: CutMoves) -> None:
         self.cuts = cuts

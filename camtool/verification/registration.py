@@ -178,9 +178,9 @@ FAR_SCALE_RATIO = 3.0
 
 
 class Registration(Struct, frozen=True, eq=False):
-    """The result: `shift_mm` by which the drawing is moved to lie under the program; the `wanted`
-    moves; findings; what the report says of it; `diameter_mm` of the tool, where all that follows
-    the drawing is cut with one, None otherwise."""
+    """The result of a registration. `shift_mm`: how far the drawing is moved to lie under the
+    program; the `wanted` moves; findings; the entry of the report; `diameter_mm` of the tool, None
+    unless all cuts that follow the drawing are made with one tool."""
 
     shift_mm: tuple[float, float]
     wanted: Toolpath
@@ -231,9 +231,9 @@ class _Lines(Struct, frozen=True, eq=False):
 
 
 class _Path(Struct, frozen=True, eq=False):
-    """The cuts of a program as points (S, 2) mm with the length that each stands for (S,), the row
-    (S,) and the tool (S,) of each. For its place: boxes (B, 2, 2) of its closed parts, centres
-    (A, 2) of its arcs, and its holes (H, 2)."""
+    """The cuts of a program as sample points (S, 2), mm, with the length (S,) that each stands
+    for, its row (S,) and tool (S,). For the search of the place: boxes (B, 2, 2) of closed parts,
+    centres (A, 2) of arcs, and holes (H, 2)."""
 
     points: Floats
     length: Floats
@@ -382,7 +382,7 @@ def _empty_registration(running: Toolpath, findings: Sequence[Finding]) -> Regis
 
 
 class _Place(Struct, frozen=True):
-    """A shift, and the part of the path that follows the lines there."""
+    """A shift of the drawing, and the share of the path that then follows its lines."""
 
     shift: tuple[float, float]
     share: float
@@ -712,7 +712,8 @@ def _candidate_radii(distances: Floats, length: Floats) -> list[float]:
 
 
 class _RadiusTrial(Struct, frozen=True, eq=False):
-    """A radius, its tracks that are followed, and which points (S,) follow them."""
+    """A trial of a tool's radius: the tracks that are followed with it, and the mask (S,) of the
+    points that follow them."""
 
     radius_mm: float
     tracks: _Tracks

@@ -252,8 +252,8 @@ class AskedReport(msgspec.Struct, frozen=True):
 
 
 class FoundTool(msgspec.Struct, frozen=True):
-    """A tool whose path keeps to the lines of the drawing: its number, None where the program
-    mounts none, its diameter, 0 for a path on the lines, and whether that was given."""
+    """A tool whose path keeps to the lines of the drawing: its number (None if the program mounts
+    none), its diameter (0 for a path on the lines), and whether that was given by the user."""
 
     number: int | None
     diameter_mm: float
@@ -261,10 +261,10 @@ class FoundTool(msgspec.Struct, frozen=True):
 
 
 class FoundReport(msgspec.Struct, frozen=True):
-    """The lines of a drawing that a program of unknown origin cuts: by how much the drawing was
-    moved to lie under it, and whether its place was looked for (`aligned`); the part of the cuts
-    that follow it, and the length of those that do not; the tools; on which side how many contours
-    are cut; how far the program itself lies from them."""
+    """The lines of a drawing that a program of unknown origin cuts: how far the drawing was moved
+    to lie under it, and whether its place was searched for (`aligned`); the share of the cuts that
+    follow the lines, and the length of those that do not; the tools; the number of contours cut on
+    each side; and the distance of the program from the lines."""
 
     shift_mm: tuple[float, float]
     aligned: bool
@@ -285,9 +285,9 @@ COVERAGE = 2.0
 
 
 class ContributionReport(msgspec.Struct, frozen=True):
-    """The contribution of an input to the standard uncertainty of a dimension, µm; null where the
-    uncertainty of the input is not known. Then `at_most_um` bounds by how much it can change the
-    dimension within the range that `within` names; null where nothing bounds it."""
+    """The contribution of an input to the standard uncertainty of a dimension, µm; null if the
+    uncertainty of the input is not known. In that case `at_most_um` bounds its effect on the
+    dimension within the range that `within` names; null if nothing bounds it."""
 
     input: str
     um: float | None
@@ -296,17 +296,18 @@ class ContributionReport(msgspec.Struct, frozen=True):
 
 
 class InspectedReport(msgspec.Struct, frozen=True):
-    """A dimension of the part with its limits, in mm but where a name says otherwise.
+    """A dimension of the part with its limits, in mm unless a name says otherwise.
 
-    `places_mm`: two places in the work frame between which a picture shows it. `lower_mm` and
-    `upper_mm` are limits of the size, null without any. Predicted are the best fit and the least
-    and the largest local size. `standard_um` is the standard uncertainty of that one of these that
-    decides, from what is known, and `unknown_um` by how much all that is not known can change it,
-    both null where nothing bounds that; `guard_um` by how much it must be within its limit to be
-    surely in. `probability`: to be within the limits, where something is not known that which is
-    least in favour of the verdict. `verdict`: "in", "out", "undecided", or "predicted" without
-    limits. `unknown`: keys of [uncertainty] that matter and that nobody says; `measure`: what one
-    should measure next, "" for none."""
+    `places_mm`: two places in the work frame between which a picture shows it. `lower_mm`,
+    `upper_mm`: limits of the size, null without any. The predicted sizes are the best fit, and the
+    least and the largest local size; one of them decides the verdict. `standard_um`: the known
+    part of the standard uncertainty of that one; `unknown_um`: the greatest change that everything
+    unknown can make to it; both null if nothing bounds that. `guard_um`: how far inside its limit
+    it must be to be surely in. `probability`: that it is within the limits; if something is
+    unknown, the value least in favour of the verdict. `verdict`: "in", "out", "undecided", or
+    "predicted" without limits. `unknown`: keys of [uncertainty] that matter and are not given;
+    `measure`: what to measure next, "" for nothing.
+    """
 
     name: str
     kind: str
@@ -351,14 +352,16 @@ class InspectedReport(msgspec.Struct, frozen=True):
 
 
 class PlannedOperation(msgspec.Struct, frozen=True):
-    """Tool, feeds, depth and passes of an operation; feeds in mm/min. `spindle_rpm` is None
-    without a speed; `passes` and the depth of the deepest are None for kinds of operation without
-    passes. `coolant`: "off", "mist", "flood" or "both". `tool` is the index of its tool;
-    `tool_name` and `material`, that of its preset, are "" where there are none; the feed per tooth
-    and the speed of the edge are None where the flutes, or the speed, are not known, and the
-    predicted time where it is not. Their limits are those of the tool, or of its preset: from and
-    to (None: any), None where none are given. `leaves_mm`: what stays on the walls for a later
-    cut; `tabs` and `loose`: how many tabs it leaves, and pieces that nothing holds."""
+    """Tool, feeds, depth and passes of an operation; feeds in mm/min.
+
+    `spindle_rpm` is None without a speed; `passes` and the depth of the deepest are None for kinds
+    of operation without passes. `coolant`: "off", "mist", "flood" or "both". `tool`: the index of
+    its tool; `tool_name`, and the `material` of its preset, are "" if there are none. The feed per
+    tooth and the cutting speed are None if the flutes, or the speed, are not known, and so is the
+    predicted time. Their limits are those of the tool or its preset, (least, greatest or None),
+    None if not given. `leaves_mm`: what stays on the walls for a later cut; `tabs`: the number of
+    tabs that it leaves.
+    """
 
     name: str
     kind: str
@@ -383,9 +386,9 @@ class PlannedOperation(msgspec.Struct, frozen=True):
 
 
 class PlannedTool(msgspec.Struct, frozen=True):
-    """A tool in the order of first use; `words` say its shape. It must stick out of its holder by
-    more than `reach_mm`, the depth of its deepest cut, and what stands above the stock; how far
-    it does, and how wide its holder is, None where the job does not say it."""
+    """A tool, in the order of first use; `words` describe its shape. It must stick out of its
+    holder by more than `reach_mm` (the depth of its deepest cut) plus what stands above the stock.
+    Its stick-out and the width of its holder are None if the job does not give them."""
 
     number: int | None
     name: str
@@ -397,8 +400,8 @@ class PlannedTool(msgspec.Struct, frozen=True):
 
 
 class PlannedStock(msgspec.Struct, frozen=True):
-    """The stock in the work frame, its top at Z0: its lower left corner and its size, None where
-    the job does not give them; how far below it cuts may go, mm."""
+    """The stock in the work frame, its top at Z0: lower left corner and size (None if the job does
+    not give them), and the depth, mm, to which cuts may go below it."""
 
     thickness_mm: float
     corner_mm: tuple[float, float] | None
@@ -407,16 +410,18 @@ class PlannedStock(msgspec.Struct, frozen=True):
 
 
 class Planned(msgspec.Struct, frozen=True):
-    """The length of rapids in XY, mm: of the program, and what it would be in the order and from
-    the starts of the drawing; how the operations cut, their tools, and the stock, if the job says
-    it. `zero`: where part zero is on the drawing, "drawing" for its own, "lower-left" or "centre"
-    of what is cut, a place (x, y) mm of it, or "set-up" where a set-up has turned or moved it;
-    `cut_mm`: left, lower, right and upper end of what the tools cut, `swept_mm` of what tools and
-    holders pass over, at any height; `touch_mm`: for each tool that is mounted in the program, a
-    place (x, y) mm where the top of the stock is not cut yet, None where there is none; `setup`:
-    which set-up of the part this is, in words; `pins_mm`: places of its alignment pins;
-    `flip_error_mm`: how far its cuts may lie beside those of the other face, None if that is not
-    known."""
+    """Figures of planning. The length of rapids in XY, mm: in the program, and as it would be in
+    the drawing's order and with its starts. The operations, their tools, and the stock if the job
+    gives it.
+
+    `zero`: the place of part zero on the drawing: "drawing" for its own zero, "lower-left" or
+    "centre" of what is cut, a point (x, y), mm, or "set-up" if a set-up has turned or moved it.
+    `cut_mm`: (left, low, right, high) of what the tools cut; `swept_mm`: the same of what tools
+    and holders pass over at any height. `touch_mm`: for each tool that is mounted during the
+    program, a place (x, y), mm, where the top of the stock is not cut yet, None if there is none.
+    `setup`: text on the set-up that this is; `pins_mm`: its alignment pins; `flip_error_mm`: how
+    far its cuts may lie beside those of the other face, None if not known.
+    """
 
     rapid_drawn_mm: float
     rapid_mm: float
@@ -433,8 +438,9 @@ class Planned(msgspec.Struct, frozen=True):
 
 
 class BaselineReport(msgspec.Struct, frozen=True):
-    """The same job without `--minimise reversals`, `--approach` and `--compensate`: reversals of
-    X and Y, the largest predicted error, the time. Null where that job cannot be made."""
+    """Figures of the same job without `--minimise reversals`, `--approach` and `--compensate`:
+    reversals of X and Y, the largest predicted error, the time. Null if that job cannot be posted.
+    """
 
     reversals_cutting: int | None = None
     reversals_air: int | None = None
@@ -443,12 +449,12 @@ class BaselineReport(msgspec.Struct, frozen=True):
 
 
 class EngagementReport(msgspec.Struct, frozen=True):
-    """A bound of the greatest engagement angle of an operation on the predicted slides, outside of
-    entries, within 1° of an angle that there is, and where it is: the place, and the block from 1.
-    Null where it is not judged, or nothing is cut. `operation` is "" where
-    only the program is known. `limit_deg`: the limit that the operation has,
-    null for none; `left_mm`: of an operation with a limit the greatest height of material that the
-    program leaves (`MATERIAL_LEFT`), 0 if none was found, null where that is not judged."""
+    """An upper bound of the greatest engagement of an operation, predicted on the slides, outside
+    of entries and within 1° of an engagement that occurs; its place, and its block (from 1). Null
+    if it is not judged, or nothing is cut. `operation` is "" if only the program is known.
+    `limit_deg`: the limit that the operation sets, null for none; `left_mm`: for an operation with
+    a limit, the greatest height of material that the program leaves (`MATERIAL_LEFT`), 0 if none
+    was found, null if not judged."""
 
     operation: str
     greatest_deg: float | None
@@ -993,9 +999,9 @@ class Setup(Struct, frozen=True):
 
 
 class ReportPage(Struct, frozen=True):
-    """A page: `report` is None where the program could not be judged; `findings` then say why.
-    `pictures` are (caption, address): of a file beside the page, or a data address; `stock` is
-    that of the stock with part zero, "" without one."""
+    """A page about a program. `report` is None if the program could not be judged; `findings` then
+    say why. `pictures`: (caption, address) of each, a file beside the page or a data URI; `stock`:
+    the address of the picture of the stock with part zero, "" without one."""
 
     title: str
     report: Report | None
@@ -1044,8 +1050,8 @@ def page_json(page: ReportPage) -> str:
 
 
 class ReportSheet(Struct, frozen=True):
-    """A table: `noun` is what its rows are called, `words` the number of leading columns with text
-    (the others hold numbers). Cells are not escaped."""
+    """A table of a page: `noun`, the name of its rows; `words`, the number of leading columns with
+    text (the others hold numbers). Cells are not escaped."""
 
     noun: str
     heads: tuple[str, ...]

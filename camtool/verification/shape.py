@@ -92,7 +92,8 @@ MAX_SLIDE_SAMPLES = 200_000
 
 
 class MachinedShape(Struct, frozen=True):
-    """The machined shape against the wanted shape, mm and mm²; `tolerance_mm` of the chords."""
+    """Over- and undercut of the machined shape against the wanted one, mm and mm²; `tolerance_mm`:
+    that of the chords."""
 
     diameter_mm: float
     overcut_mm2: float
@@ -103,7 +104,7 @@ class MachinedShape(Struct, frozen=True):
 
 
 class Cutter(Struct, frozen=True):
-    """A tool as seen from above: its diameter, and, where it is narrower at its tip, its shape."""
+    """A tool seen from above: its diameter, and its shape if it is narrower at its tip."""
 
     diameter_mm: float
     nose: Tool | None = None

@@ -72,8 +72,8 @@ class SeenCircle(Struct, frozen=True, eq=False):
 
 
 class Paths(Struct, frozen=True, eq=False):
-    """The cuts of a program and the wanted ones (one object, where it is compared with itself),
-    the full circles of these, and by how much heights may differ, mm."""
+    """The cuts of a program and the wanted cuts (the same object if it is compared with itself),
+    the full circles of the latter, and the tolerance of heights, mm."""
 
     decoded: CutMoves
     wanted: CutMoves
@@ -87,8 +87,8 @@ progress then."""
 
 
 class SlidePass:
-    """Takes the motion in order, and gives the figures of the rows and where the slides are in
-    them to `rows` and `extents`; its own figures are complete after `finish`."""
+    """Takes the motion in order and judges it: `rows` gets the figures of the rows, `extents` the
+    positions of the slides; its own figures are complete after `finish`."""
 
     def __init__(
         self,
@@ -382,8 +382,8 @@ class SlideTrace(Struct, frozen=True, eq=False):
 
 
 class TraceSize(Struct, frozen=True, eq=False):
-    """The start of the slides (1, 2) mm; one of every `stride` samples of a row is kept (0: none
-    at all); the most points of a trace."""
+    """The start of the slides (1, 2), mm; `stride`: one of every so many samples of a row is kept
+    (0: none); the greatest number of points of a trace."""
 
     start: Floats
     stride: int

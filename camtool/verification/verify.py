@@ -77,9 +77,10 @@ __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """The report, the findings in it, the case that was judged, the path of the slides for
-    pictures, the figures of each row, the moves with which the path was compared, which of their
-    rows each decoded row follows (N,), −1 for none, and full circles."""
+    """The result of a verification: the report; the findings in it; the case; the path of the
+    slides for pictures; the figures of each row; the moves with which the path was compared
+    (`wanted`), and the row of these that each decoded row follows (`follows` (N,), −1 for none);
+    and the full circles."""
 
     report: Report
     trace: SlideTrace

@@ -22,7 +22,7 @@ STANDING_S = 1e-7
 
 
 class Peak(Struct, frozen=True):
-    """An extreme value: since when it holds, and in which row of the toolpath."""
+    """An extreme value, the time from which it holds, and its row of the toolpath."""
 
     value: float
     at_s: float

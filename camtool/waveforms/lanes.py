@@ -68,7 +68,7 @@ class Strip(Struct, frozen=True, eq=False):
 
 
 class TimePlot(Struct, frozen=True, eq=False):
-    """All that a picture shows."""
+    """The content of a picture over time."""
 
     title: str
     notes: tuple[str, ...]

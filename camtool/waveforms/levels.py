@@ -81,7 +81,7 @@ def levels(board: Board, chunks: Iterable[Pulses]) -> Iterator[LineLevels]:
 
 
 class _Changes(Struct, frozen=True, eq=False):
-    """Changes of some bits of the port in this column: at tick (E,), to `value` (E,)."""
+    """Changes of the bits `mask` of the port in this column: at tick (E,), to `value` (E,)."""
 
     column: int
     mask: int

@@ -45,11 +45,11 @@ QUANTITIES = 4
 
 
 class AxisMove(Struct, frozen=True):
-    """An axis in one order of the controller: since when it runs, `at_s`, its block (from 1, 0:
-    none), its full reference, and its peak, rpm of the motor; the part by which the peak exceeds
-    the reference; the time until the speed stays within 2 % of it, None where it never does; the
-    mean error of the speed at the end of the full reference, as a part of it, None where that is
-    too short; and how far beside its place the axis stands at the end of the order, µm."""
+    """The figures of an axis in one order of the controller: its begin `at_s` and its block (from
+    1, 0: none); its full reference and its peak speed, rpm of the motor; the overshoot, as a share
+    of the reference; the time until the speed stays within 2 % of the reference, None if it never
+    does; the mean error of the speed at the end of the full reference, as a share of it, None if
+    that is too short; and the distance of the axis from its programmed place at the end, µm."""
 
     axis: str
     at_s: float

@@ -37,7 +37,8 @@ KINDS = (".vcd", ".csv", ".svg", ".png")
 
 class PulseCounts(Struct, frozen=True, eq=False):
     """Counts of a whole run: `steps` (M,) of the motors, `added` (M,) steps at reversals;
-    `shortest_s` (M,) between two pulses, infinite for fewer than two; `seconds` of the program."""
+    `shortest_s` (M,), the least time between two pulses, infinite for fewer than two; `seconds`,
+    the time of the program."""
 
     steps: Ints
     added: Ints

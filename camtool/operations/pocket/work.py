@@ -92,8 +92,8 @@ there is none."""
 
 
 class Pocket(Struct, frozen=True, eq=False):
-    """A region to be cleared, on the left of its closed paths, work frame; the name of its
-    outer path and the index of that in the placed drawing."""
+    """A region to be cleared, on the left of its closed paths, in the work frame; the name of its
+    outer path, and the index of that in the placed drawing."""
 
     region: Polylines
     name: str

@@ -87,8 +87,8 @@ def checked_slot(operation: Operation, _: Stock | None) -> Operation:
 
 
 class SlotWall(Struct, frozen=True, eq=False):
-    """A path of the tool's centre along a wall, with what is to stay on its left, and the chosen
-    path to which it belongs."""
+    """A path of the tool's centre along a wall, with the material that stays on its left, and the
+    chosen path that it belongs to."""
 
     path: Polyline
     source: int
@@ -105,8 +105,8 @@ def without_feet(path: Polyline, tool_mm: float) -> Polyline:
 
 
 class _Band(Struct, frozen=True, eq=False):
-    """A region of tool centres to be cleared, the lines along its middle, and what bounds it: the
-    paths (Polylines) from which it was made, and the chosen path to which each belongs."""
+    """A region of tool centres to be cleared; the lines along its middle; the paths that bound it
+    (Polylines), and the chosen path that each of these belongs to."""
 
     region: Polylines
     lines: Polylines
