@@ -249,8 +249,8 @@ class _Text:
         """True if only blanks are left."""
         return self.at == len(self.text)
 
-    def fail(self, offset: int, message: str, mend: str = "") -> None:
-        """Raise ProgramError at an offset; never returns."""
+    def fail(self, offset: int, message: str, mend: str = "") -> NoReturn:
+        """Raise ProgramError at an offset."""
         fail(self._where(offset), message, mend)
 
     def where_in(self, value: _Value, row: int, column: int) -> str:
@@ -268,7 +268,6 @@ class _Text:
         match = _NAME.match(self.text, offset)
         if match is None:
             self.fail(offset, f"{self._quoted(offset)} is no `name = numbers;`", "remove it")
-            raise AssertionError
         self.at = match.end()
         return match[1], match[2], offset
 
@@ -277,7 +276,6 @@ class _Text:
         match = _TEXT_NUMBER.match(self.text, self.at)
         if match is None:
             self.fail(self.at, f"{self._quoted(self.at)} is no whole number")
-            raise AssertionError
         self._finish(match.end())
         return _Value(np.array([[self._int(match[0], match.start())]]), match.start())
 
@@ -286,7 +284,6 @@ class _Text:
         match = _LIST.match(self.text, self.at)
         if match is None:
             self.fail(self.at, "jobs takes the six names of a job, in their order")
-            raise AssertionError
         self._finish(match.end())
 
     def table(self) -> _Value:
@@ -294,7 +291,6 @@ class _Text:
         match = _ROWS.match(self.text, self.at)
         if match is None:
             self._fail_rows()
-            raise AssertionError
         begin = match.start(1)
         if _WHOLE.fullmatch(match[1]) is None:
             self._refuse_words(begin, match.end(1))
@@ -336,7 +332,7 @@ class _Text:
             self.fail(offset, f"{word[:SHOWN_CHARS]!r} is no whole number of an int16")
         return int(word)
 
-    def _fail_rows(self) -> None:
+    def _fail_rows(self) -> NoReturn:
         """Refuse an array at its first fault: its opening, a character in it, or its missing
         end."""
         if self.text[self.at : self.at + 1] != "[":
@@ -356,7 +352,6 @@ class _Text:
         match = _END.match(self.text, offset)
         if match is None:
             self.fail(offset, f"{self._quoted(offset)} stands behind a value")
-            raise AssertionError
         self.at = self._blank(match.end())
 
     def _blank(self, offset: int) -> int:
