@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Floats
 from camtool.kernels.engagement import Cleared
+from tests.oracles import open_angles
 from tests.strategies import examples
 
 pytestmark = pytest.mark.checked
@@ -136,3 +137,116 @@ def test_straight_down_the_part_of_the_whole_circle_counts(gap: float, share: fl
     down = np.array([[5.0 + gap, 5.0, 5.0 + gap, 5.0, 1.0, -1.0, 1.0, 0.0, 0.0]])
     bound = cleared.judge(down, np.ones(1, dtype=np.bool_), 1e-6, 0.0, 1e-3)
     assert bound[0] == pytest.approx(share * math.tau, abs=1e-2)
+
+
+@st.composite
+def dense_programs(draw: st.DrawFn) -> Floats:
+    """Up to some 60 short moves, as strokes leave them: rows side by side, rings, zigzags and ways
+    straight down, of tools of two radii at three depths; turned, mirrored or reversed."""
+    rng = np.random.default_rng(draw(st.integers(0, 10_000)))
+    parts = []
+    for _ in range(draw(st.integers(1, 5))):
+        kind, count = draw(st.sampled_from(["row", "ring", "zigzag", "down"])), rng.integers(2, 16)
+        begin = rng.uniform(0.0, 6.0, 2)
+        share = np.linspace(0.0, 1.0, count)[:, None]
+        if kind == "row":
+            path = begin + share * rng.uniform(-4.0, 4.0, 2)
+        elif kind == "ring":
+            angle = rng.uniform(1.0, 7.0) * share
+            path = begin + rng.uniform(0.02, 3.0) * np.hstack([np.cos(angle), np.sin(angle)])
+        elif kind == "zigzag":
+            path = begin + np.cumsum(rng.choice([-0.5, 0.0, 0.5], (count, 2)), axis=0)
+        else:
+            path = np.repeat(begin[None, :], 2, axis=0)
+        low = float(rng.choice([-2.0, -1.0, -0.5]))
+        rest = [rng.choice([0.6, 1.0]), low, low + rng.choice([0.0, 0.5])]
+        flat = np.broadcast_to([*rest, *rng.uniform(-0.3, 0.3, 2)], (len(path) - 1, 5))
+        parts.append(np.column_stack([path[:-1], path[1:], flat]))
+        if draw(st.booleans()):
+            beside = parts[-1].copy()
+            beside[:, [1, 3]] += rng.uniform(0.0, 0.5)
+            parts.append(beside)
+    moves = np.concatenate(parts)
+    if draw(st.booleans()):
+        c, s = np.cos(1.0), np.sin(1.0)
+        for ends in (slice(0, 2), slice(2, 4)):
+            moves[:, ends] = moves[:, ends] @ np.array([[c, s], [-s, c]])
+    if draw(st.booleans()):
+        moves[:, [0, 2, 7, 8]] *= -1.0
+    if draw(st.booleans()):
+        moves = moves[::-1, [2, 3, 0, 1, 4, 5, 6, 8, 7]] * [1, 1, 1, 1, 1, 1, 1, -1, -1]
+    return np.ascontiguousarray(moves)
+
+
+def pair_of(draw: st.DataObject, moves: Floats) -> tuple[Cleared, open_angles.Cleared]:
+    """The kernel and the literal one, with extents that may be smaller than what is cut."""
+    ends = np.concatenate([moves[:, :2], moves[:, 2:4]])
+    extents = np.stack([ends.min(axis=0), ends.max(axis=0)])
+    if draw.draw(st.booleans(), label="small extents"):
+        extents[1] = extents[0] + 0.3 * (extents[1] - extents[0])
+    box = np.array([-np.inf, -np.inf, WALL, np.inf])
+    from_right = draw.draw(st.booleans(), label="from right")
+    return (
+        Cleared(extents, 1.0, box, from_right=from_right),
+        open_angles.Cleared.like(extents, 1.0, box, from_right=from_right),
+    )
+
+
+@examples(100, nightly=10_000)
+@given(dense_programs(), st.data())
+def test_bounds_are_to_the_bit_those_of_the_literal_loops(
+    moves: Floats, data: st.DataObject
+) -> None:
+    kernel, literal = pair_of(data, moves)
+    cuts = np.arange(len(moves)) % 7 != 3
+    enough, fine = data.draw(st.sampled_from([(0.0, 0.05), (1.0, math.inf), (0.6, 0.01)]))
+    options = data.draw(
+        st.sampled_from([{}, {"coarse_rad": 0.05, "known_rad": 0.0}, {"adds": False}])
+    )
+    first = len(moves) // 3
+    for each in (kernel, literal):
+        each.add(moves[:first])
+    found, wanted = (
+        each.judge(moves[first:], cuts[first:], 0.02, enough, fine, **options)
+        for each in (kernel, literal)
+    )
+    assert found.tolist() == wanted.tolist()
+
+
+@examples(60, nightly=5_000)
+@given(dense_programs(), st.floats(0.2, 2.5), st.data())
+def test_moves_are_tried_up_to_the_first_place_above_the_limit_and_forgotten(
+    moves: Floats, limit: float, data: st.DataObject
+) -> None:
+    kernel, literal = pair_of(data, moves)
+    thick, first, every = 0.02, len(moves) // 3, np.ones(len(moves), dtype=np.bool_)
+    for each in (kernel, literal):
+        each.add(moves[:first])
+    rest = moves[first:]
+    found = kernel.try_moves(rest, thick, limit)
+    near = kernel.try_moves(rest, thick, limit, coarse_rad=0.05)
+    assert found == literal.try_moves(rest, thick, limit)
+    assert near == literal.try_moves(rest, thick, limit, coarse_rad=0.05)
+    assert near[1:] == found[1:]
+    assert near[0] <= found[0] + 1e-12
+    bounds = [each.judge(rest, every[first:], thick, 0.0, 0.05) for each in (kernel, literal)]
+    assert bounds[0].tolist() == bounds[1].tolist()
+
+
+def test_the_first_place_above_a_limit_is_where_a_cut_leaves_a_slot() -> None:
+    """A tool of radius 1 takes 0.4 beside a slot, by acos(1 − 0.4), and more behind its end: there
+    only a disc about (10, 0) is air on its right."""
+    rows = np.zeros((4, 9))
+    rows[:, :4] = [[0, 0, 10, 0], [1, 0.4, 4, 0.4], [4, 0.4, 9, 0.4], [9, 0.4, 20, 0.4]]
+    rows[:, 4] = 1.0
+    kernel = Cleared(np.array([[0.0, 0.0], [20, 1]]), 1.0, np.full(4, np.inf) * [-1, -1, 1, 1])
+    kernel.add(rows[:1])
+    limit = math.radians(60.0)
+    kept, number, share = kernel.try_moves(rows[1:3], 1e-4, limit, coarse_rad=1e-3)
+    assert (number, share) == (2, 0.0)
+    assert kept == pytest.approx(math.acos(1.0 - 0.4), abs=2e-3)
+    greatest, number, share = kernel.try_moves(rows[1:], 1e-4, limit)
+    assert (greatest > limit, number) == (True, 2)
+    beyond = 9.0 + 11.0 * share - 10.0
+    air = math.acos(0.5 * math.hypot(beyond, 0.4)) + math.atan2(-0.4, -beyond)
+    assert 0.5 * math.pi - air == pytest.approx(limit, abs=1e-3)
