@@ -164,7 +164,9 @@ def test_moved_programs_are_told_by_their_way(name: str, by: tuple[float, float,
         assert left.low >= 0.3 * left.high
 
 
-@pytest.mark.parametrize("seed", [*range(40)])
+@pytest.mark.parametrize(
+    "seed", [*range(10), *(pytest.param(k, marks=pytest.mark.slow) for k in range(10, 40))]
+)
 def test_brackets_of_random_jobs_hold_what_dense_points_show(seed: int) -> None:
     """No point of a dense lattice shows more than what is proved, and what is found is there."""
     asked = random_job(np.random.default_rng(seed))

@@ -207,7 +207,7 @@ def foreign(rng: np.random.Generator, count: int) -> bytes:
         path.line(*rng.uniform(-1, 1, 2), feed=0.8)
         x, y, _z = path.position
         angle = rng.uniform(0.0, 6.0)
-        to, radius = angle + rng.uniform(0.5, 5.0), rng.uniform(0.02, 0.4)
+        to, radius = angle + rng.uniform(0.5, 5.0), rng.uniform(0.02, 0.2)
         cx, cy = x - radius * math.cos(angle), y - radius * math.sin(angle)
         end = cx + radius * math.cos(to), cy + radius * math.sin(to)
         path.arc(*end, centre=(cx, cy), ccw=True, feed=1)

@@ -76,7 +76,13 @@ def slides_by_hand(program: bytes, strings: list[bytes]) -> list[tuple[float, fl
     return found
 
 
-@pytest.mark.parametrize("program", [ACROSS, logo("pic-mmh")], ids=["across", "logo"])
+@pytest.mark.parametrize(
+    "program",
+    [
+        pytest.param(ACROSS, id="across"),
+        pytest.param(logo("pic-mmh"), id="logo", marks=pytest.mark.slow),
+    ],
+)
 def test_what_is_predicted_is_what_the_strings_make(program: bytes) -> None:
     strings = sent(program, *SETTINGS)
     predicted = motion(program, load_target("pic-mmh", settings=SETTINGS)).slide[:, :2]
