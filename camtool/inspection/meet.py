@@ -52,7 +52,7 @@ from camtool.inspection.dimensions import DEPTHS
 from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import minimise
 from camtool.inspection.tolerances import unbound_findings
-from camtool.inspection.uncertainty import CERTAIN
+from camtool.inspection.uncertainty import CERTAIN, Machined, MachineVariant
 from camtool.inspection.verdicts import (
     GUARD,
     NOT_INSPECTED,
@@ -62,7 +62,7 @@ from camtool.inspection.verdicts import (
 )
 from camtool.jobs.changes import LEFT_DIGITS, Change, Left, changed_tables_of, text_of
 from camtool.jobs.keys import OPERATION, is_known
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, Uncertainty
 from camtool.pipeline import post_drawing
 from camtool.plain import one_line
 from camtool.planning.place import place
@@ -638,6 +638,7 @@ class Bench(Struct, eq=False, dict=True):
     progress: Progress
     trials: int = 0
     _known: dict[bytes, MeetingTrial] = field(default_factory=dict)
+    _simulated: dict[tuple[bytes, object], Floats] = field(default_factory=dict)
     _first: dict[tuple[str, int | None], InspectedReport] = field(default_factory=dict)
 
     @cached_property
@@ -722,7 +723,7 @@ class Bench(Struct, eq=False, dict=True):
         if new or not is_beyond:
             verdicts = [
                 each if isinstance(each, InspectedReport) else None
-                for each in verdicts_of(inspector, run)
+                for each in verdicts_of(inspector, run, self._simulate_once(inspector, run))
             ]
         present = [k for k, each in enumerate(verdicts) if each is not None]
         assert run.report is not None
@@ -746,6 +747,20 @@ class Bench(Struct, eq=False, dict=True):
             for name, by_mm in allowances.items()
         }
         return replace(trial, left=self.contours.left({**so_far, **total}))
+
+    def _simulate_once(self, inspector: Inspector, run: Run) -> Machined:
+        """Return `inspector.machined`, but simulate a program on a machine once, whatever the
+        uncertainties of its numbers are: a certificate tries seven or eight values of each."""
+
+        def machined(variant: MachineVariant) -> Floats:
+            machine = replace(variant.machine, uncertainty=Uncertainty())
+            offsets = variant.wider_mm, variant.deeper_mm, variant.thicker_mm, variant.beside_mm
+            key = _digest(run, machine), offsets
+            if key not in self._simulated:
+                self._simulated[key] = inspector.machined(variant)
+            return self._simulated[key]
+
+        return machined
 
     def _predict_verdicts(self, inspector: Inspector) -> Iterator[InspectedReport | None]:
         """Yield each dimension with its sizes, and the verdict that follows if its uncertainty is

@@ -36,7 +36,7 @@ from camtool.inspection.findings import (
 )
 from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import MachinedSize
-from camtool.inspection.uncertainty import Budget, inputs_of, propagate
+from camtool.inspection.uncertainty import Budget, Machined, inputs_of, propagate
 from camtool.records import replace
 from camtool.run import Run
 from camtool.units import UM_PER_MM
@@ -136,9 +136,12 @@ def _as_error(finding: Finding) -> Finding:
     return replace(finding, severity=Severity.ERROR) if is_error else finding
 
 
-def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Finding]:
+def verdicts_of(
+    inspector: Inspector, run: Run, machined: Machined | None = None
+) -> Iterator[InspectedReport | Finding]:
     """Yield the verdict of each dimension, in order, or a finding if the slides miss its feature,
-    or may miss it on a machine that differs by an uncertainty."""
+    or may miss it on a machine that differs by an uncertainty. `machined` takes the
+    place of `inspector.machined`, for callers that know some of its results already."""
     if not inspector.dimensions:
         return
     inputs = inputs_of(
@@ -148,7 +151,11 @@ def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Fi
         flip_errors_mm=inspector.flip_errors_mm,
     )
     budget = propagate(
-        inspector.machined, inputs, inspector.edges, measure=inspector.measured, extremes=True
+        machined or inspector.machined,
+        inputs,
+        inspector.edges,
+        measure=inspector.measured,
+        extremes=True,
     )
     sizes = budget.values.reshape(-1, 3)
     measured = np.isfinite([budget.values, budget.standards]).all(axis=0).reshape(-1, 3)
