@@ -1,56 +1,25 @@
 """Running the command line as a user does: arguments in, exit code and output out."""
 
-import io
-import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from tests.commands import Done, run_here
+
 ROOT = Path(__file__).parents[2]
-
-
-@dataclass(frozen=True)
-class Done:
-    """Exit code and output of a run."""
-
-    returncode: int
-    stdout: bytes
-    stderr: bytes
 
 
 Run = Callable[..., Done]
 
 
 @pytest.fixture
-def camtool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+def camtool(tmp_path: Path) -> Run:
     """`camtool("post", "a.dxf", ...)` in an empty folder, through `main()` in this process."""
-    from camtool.cli.main import main
-
-    def run(*arguments: str | Path, stdin: bytes = b"") -> Done:
-        out, err = io.BytesIO(), io.BytesIO()
-        with monkeypatch.context() as patch:
-            patch.chdir(tmp_path)
-            patch.setattr(sys, "argv", ["camtool", *map(str, arguments)])
-            patch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(stdin), encoding="utf-8"))
-            patch.setattr(sys, "stdout", io.TextIOWrapper(out, encoding="utf-8"))
-            patch.setattr(sys, "stderr", io.TextIOWrapper(err, encoding="utf-8"))
-            patch.setattr(sys, "unraisablehook", sys.unraisablehook)
-            handler = signal.getsignal(signal.SIGINT)
-            try:
-                with pytest.raises(SystemExit) as stopped:
-                    main()
-            finally:
-                signal.signal(signal.SIGINT, handler)
-            sys.stdout.flush()
-            sys.stderr.flush()
-            code = stopped.value.code
-            return Done(code if isinstance(code, int) else -1, out.getvalue(), err.getvalue())
-
-    return run
+    return partial(run_here, folder=tmp_path)
 
 
 @pytest.fixture

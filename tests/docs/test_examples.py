@@ -14,6 +14,7 @@ import contextlib
 import io
 import os
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,6 +22,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.commands import run_here
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(console|python|text)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -55,6 +58,20 @@ def shell(command: str, folder: Path, before: int) -> tuple[str, int]:
     return result.stdout, result.returncode
 
 
+PLAIN = re.compile(r"camtool [^|<>;&$*?~`#(){}!]*", re.DOTALL)
+"""A command that no shell needs to change or to join with others: it is run in this process, which
+saves the start of one, as long as many commands take."""
+
+
+def run(command: str, folder: Path, before: int) -> tuple[str, int]:
+    """Run a command, by a shell where it needs one, and return its output and exit code."""
+    if not PLAIN.fullmatch(command):
+        return shell(command, folder, before)
+    words = shlex.split(command.replace("\\\n", " "))
+    done = run_here(*words[1:], folder=folder, merged=True)
+    return done.stdout.decode(), done.returncode
+
+
 def commands(block: str) -> Iterator[tuple[str, str]]:
     """Yield each command of a block with its shown output; a backslash continues a command."""
     for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
@@ -73,7 +90,7 @@ def console(block: str, folder: Path) -> str:
     """Run the commands of a block and return it with their output."""
     code, made = 0, []
     for command, shown in commands(block):
-        came, code = shell(command, folder, code)
+        came, code = run(command, folder, code)
         made.append(f"$ {command}{as_shown(shown, came)}")
     return "".join(made)
 
