@@ -137,7 +137,8 @@ def record_of(
         try:
             make(**{**(base or {}), key.field: fields[key.field]})
         except OptionError as error:
-            # An error with a place of its own says what contradicts what: that is for the whole.
+            # An error with a place of its own is a contradiction between keys, reported for the
+            # whole table.
             if error.where is None:
                 raise raw.refused(error.message, error.mend) from error
     try:

@@ -284,7 +284,7 @@ def _post_plan(
     if worst(findings) >= Severity.ERROR:
         return replace(run, findings=findings)
     judged_plan = plan if posting.check else None
-    del plan  # what is not judged needs no stages of it
+    del plan  # free the intermediate stages; without verification nothing reads them
     compensation = _compensate(wanted_path, target.machine) if job.compensate else None
     written = wanted_path if compensation is None else compensation.toolpath
     program, decoded = _write_and_read_back(written, target, drawing.file, progress)
@@ -346,7 +346,7 @@ def _post_plan(
     request = stock_request(
         steps, job, _beside_mm(case), before=posting.before, is_whole=posting.is_whole
     )
-    del judged_plan, full_plan  # the paths of the stages are not needed any more
+    del judged_plan, full_plan  # free the paths of the stages
     verification = _judge_program(case, program.data, progress)
     slides = ProgramSlides(case, job)
     engaged = judge_engagement(slides, request, posting.gates)
@@ -716,7 +716,7 @@ def _with_times(
 
     if written.operations is None or case.row_from is None:
         return planned
-    # Blocks that no row stands for (a header's, the end's) take their turn with the one before.
+    # Blocks that come from no row (head and end of the program) count with the row before.
     row = np.maximum.accumulate(case.row_from.clip(min=0))
     turn = np.searchsorted(written.operations.begin, row, side="right") - 1
     count = len(planned.operations)
@@ -923,7 +923,7 @@ def _stock_gates(
         if limit_mm is None:
             continue
         bracket = None
-        # What other programs have cut before is not left.
+        # Leftovers cannot be judged if other programs of the set-up have cut before.
         if request is not None and (request.is_whole or subject == "gouge"):
             with suppress(OptionError):
                 bracket = proved(cut, request.solid, limit_mm, request.before)

@@ -236,7 +236,7 @@ def serve(pipe: Connection) -> None:
         gc.disable()
         with suppress(Exception):  # the fault shows again at each drawing, with its name
             work.warm()
-        gc.freeze()  # what is loaded lasts: no search for garbage looks at it
+        gc.freeze()  # loaded objects are kept out of garbage collection
         gc.enable()
         pipe.send(READY)
         while (task := pipe.recv()) is not None:

@@ -185,7 +185,7 @@ def _up_to_date(
         return None
     try:
         content = file_digest(task.path)
-    except OSError:  # making it gives the error
+    except OSError:  # reading fails again when it is made, which gives the error
         return None
     return manifest.up_to_date(task.stem, order.key(task, content))
 

@@ -58,7 +58,7 @@ _BASH = r"""%(complete_func)s() {
             file) compopt -o default ;;
             plain)
                 case ${COMP_WORDS[COMP_CWORD]} in
-                    # In quotes only what means nothing there.
+                    # Within quotes, only values without special characters are offered.
                     [\"\']*) case $value in *[\\\$\`\"\'!]*) continue ;; esac ;;
                     *) printf -v value %%q "$value" ;;
                 esac
@@ -76,7 +76,7 @@ _ZSH = r"""#compdef %(prog_name)s
     local kind value help
     answer=("${(@f)$(env COMP_WORDS="${(j: :)words[1,CURRENT]}" \
         %(complete_var)s=zsh_complete %(prog_name)s)}")
-    # --target=pi: only what stands behind the sign is completed.
+    # --target=pi: only the part after the sign is completed.
     [[ ${words[CURRENT]} == --*=* ]] && compset -P 1 '*='
     for kind value help in "${answer[@]}"; do
         case $kind in
@@ -265,7 +265,7 @@ def _targets(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """Yield the layers of the DXF drawings (text format) that are already on the command line."""
-    # What stands before a flag that still lacks its value has not been given its place.
+    # Arguments before a flag that still lacks its value are not assigned to parameters yet.
     named = [*(ctx.params.get(key) or () for key in _DRAWINGS), tuple(ctx.args)]
     names_given = [Path(name) for names in named for name in _several(names)]
     for name in sorted({layer for file in names_given for layer in dxf_layers(file)}):

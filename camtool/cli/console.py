@@ -100,12 +100,12 @@ class _Talk:
         self._next: list[str | None] = []  # the line that waits
         self._say = Messages(quiet=quiet)
         self._unshown: list[str] = []
-        self._shows = True  # whether anybody reads what is shown
+        self._shows = True  # False if nobody reads what is shown
         self._heard = self._spoke = self._opened = time.monotonic()
         self._knocked = 0.0
         self._asked, self._answered = "", True
-        self._told: float | None = None  # since when it is to stop
-        self._stops = False  # whether nothing was typed since
+        self._told: float | None = None  # time at which it was told to stop
+        self._stops = False  # True if nothing was typed since
         self._code: int | None = None  # the exit code, when the machine stands
 
     def run(self) -> int:
@@ -167,7 +167,7 @@ class _Talk:
             return None
         text = self._next.pop()
         if text is None:
-            wish = wishes()  # a terminal that is closed ends its lines too
+            wish = wishes()  # a closed terminal ends the input too
             if wish is not None and not callable(wish):
                 return self._stop(wish, by_hand=wishes.by_hand)
             if terminal.runs_on:

@@ -112,7 +112,7 @@ def check_ours(name: str, is_ours: Callable[[bytes], bool]) -> None:
         return
     try:
         own_file = is_ours(Path(name).read_bytes())
-    except OSError:  # nobody can know
+    except OSError:  # cannot be checked
         own_file = False
     if not own_file:
         raise OutputError(
@@ -361,7 +361,7 @@ def is_foreign(place: str | Path, maker: str) -> bool:
         return False
     try:
         data = Path(place).read_bytes()
-    except OSError:  # whatever it is, it is none of ours
+    except OSError:  # unreadable, so not ours
         return True
     return data != seal(data[: data.rfind(SEAL)], maker)
 

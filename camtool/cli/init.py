@@ -201,7 +201,7 @@ def init(
     text = machine_text(name, target, list(settings_by_key.values()), settings or "")
     place = _place(name, output, project=project)
     files, names = {str(place): text.encode()}, Path() if project else user_folder()
-    # That of a project always names it, the user's where it names none.
+    # The camtool.toml of a project always gets the new machine, the user's only if it names none.
     default = output is None and (project or not names_machine(names / FILE))
     if default:
         files[str(names / FILE)] = text_naming_machine(names / FILE, name).encode()

@@ -221,7 +221,7 @@ def _system_errors() -> Iterator[None]:
             raise OutputError(f"cannot be written ({error.strerror})", file="<stdout>") from error
         if error.filename is None or isinstance(error, CamtoolError):
             raise
-        # A name that the system refuses, in any place: too long, a loop of links.
+        # A file name that the system refuses anywhere: too long, a loop of links.
         name = os.fsdecode(error.filename)
         raise InputError(f"cannot be used ({error.strerror})", file=name) from error
 

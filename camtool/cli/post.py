@@ -333,7 +333,7 @@ def finish(
             quiet=False,
         )
         return 1
-    # A dialect of several forms (binary, listing) says only now which extension it takes.
+    # For a dialect with several forms (binary, listing) the extension is known only now.
     requested.check(run.program.extension, verified=True)
     output = requested.program(run.program.extension)
     if requested.output is None:

@@ -232,7 +232,7 @@ def takes_more(stream: TextIO | None) -> bool:
     if stream is None or not hasattr(select, "poll"):
         return True
     looking = select.poll()
-    with suppress(OSError, ValueError):  # it is none of the system
+    with suppress(OSError, ValueError):  # a stream without a file descriptor
         looking.register(stream.fileno(), select.POLLOUT)
         return bool(looking.poll(0))
     return True

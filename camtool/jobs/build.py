@@ -343,7 +343,7 @@ def _settled(operation: Operation, layers: Sequence[Table], stock: Stock | None)
     try:
         return operation.settled(stock)
     except OptionError as error:
-        # The last pass may be what is wrong with the depth.
+        # The fault may be in the last pass, which has a key of its own.
         key_values = _merged_layers(layers).given
         named = re.search(r"key (\w+)$", error.where or "")
         keys = (named[1] if named else "", "breakthrough", "kind")

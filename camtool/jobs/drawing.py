@@ -72,8 +72,8 @@ def read_to_scale(
 
 
 def _takes_all(job: Job, options: ReadOptions) -> bool:
-    """Return True if the job takes all that is drawn, and its box is one along the axes of the
-    drawing."""
+    """Return True if the job takes all that is drawn, and the box of that is parallel to the axes
+    of the drawing."""
     quarters = job.placement.rotate_rad / (0.5 * math.pi)
     return (
         options.select == Selection()

@@ -91,7 +91,8 @@ def crowded(drawing: Drawing, width_mm: float) -> frozenset[int]:
     _add_near(lines, waste, width_mm, is_crowded)
     sizes = np.ptp(path_extents(lines), axis=2).max(axis=1)
     is_small = sizes <= LETTER_SHARE * width_mm
-    for row in np.argsort(levels.depth, kind="stable").tolist():  # holders before what they hold
+    # outer paths before those within them
+    for row in np.argsort(levels.depth, kind="stable").tolist():
         parent = int(levels.parent[row])
         is_crowded[row] |= bool(parent >= 0 and is_crowded[parent] and is_small[parent])
     return frozenset(rows[is_crowded].tolist())
@@ -108,7 +109,8 @@ def _add_near(lines: Polylines, waste: Ints, width_mm: float, is_crowded: Bools)
         for one, other in index.pairs(grown[first : first + SEGMENTS_AT_A_TIME]):
             one = one + first
             a, b = path[one], path[other]
-            # Contours of which one crosses the other bound no waste that anybody could name.
+            # Contours that bound different waste may be near each other, but must not touch or
+            # cross.
             reach = np.where(waste[a] == waste[b], min_distance, POSITION_EPS_MM)
             low = np.maximum(boxes[one, :2], boxes[other, :2])
             high = np.minimum(boxes[one, 2:], boxes[other, 2:])

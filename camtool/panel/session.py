@@ -163,7 +163,7 @@ class Session:
         self._place_mm: Place | None = None if is_told else (0.0, 0.0, 0.0)
         self._machine_mm: Place | None = None
         self._is_homed = False
-        self._home_mm: Place | None = None  # where homing has left it, from machine zero
+        self._home_mm: Place | None = None  # position after homing, from machine zero
         steps = tuple(axis.coded_step_mm for axis in target.machine.axes)
         self._step_mm, self._rate = steps, StepRate(steps, speed)
         self._count = 0

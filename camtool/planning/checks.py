@@ -262,7 +262,8 @@ def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
     size = np.ptp(boxes, axis=2)[:, [0, 0, 1, 1]]
     findings = defaultdict[Sentence, list[Finding]](list)
     for row in np.flatnonzero((overhangs > OFF_STOCK_MM).any(axis=1)).tolist():
-        # What lies off wholly, to the side on which it lies the farthest; else how much of it.
+        # For contours wholly off the stock, the side on which they lie farthest; for others, how
+        # far they reach over the edge.
         gaps = overhangs[row] - size[row]
         is_off = bool((gaps >= np.where(size[row] > 0.0, -POSITION_EPS_MM, OFF_STOCK_MM)).any())
         edge = int((gaps if is_off else overhangs[row]).argmax())
@@ -481,7 +482,7 @@ def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
     if operation.beyond_mm > MAX_BEYOND_SHARE * tool.radius_mm:
         yield CUT_DOUBTFUL_BEYOND.words(beyond=operation.beyond_mm)
     deepest = deepest_pass(step.setting)
-    finishes = operation.stage == "finish"  # beside the wall, in what is roughed
+    finishes = operation.stage == "finish"  # it cuts beside the wall, in cleared stock
     mills = operation.contract.descent == "passes" and tool.kind in MILLS and tool.radius_mm > 0.0
     mills = mills and not finishes
     if mills and deepest > tool.diameter_mm + POSITION_EPS_MM:

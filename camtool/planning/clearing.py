@@ -589,10 +589,10 @@ def _outside(
     rows = np.concatenate([every, every, crossings_found.row_a])
     marks = np.concatenate([np.zeros(len(long_rows)), np.ones(len(long_rows)), crossings_found.ta])
     rows, marks = distinct_rows(np.column_stack([rows, marks])).T
-    parts = np.flatnonzero(rows[1:] == rows[:-1])  # a part is between two marks of one line
+    parts = np.flatnonzero(rows[1:] == rows[:-1])  # a part lies between two marks on one line
     line, begin, stop = rows[parts].astype(np.int64), marks[parts], marks[parts + 1]
     is_outside = ~region.holds(point_at(lines, line, 0.5 * (stop + begin)))
-    # Parts in a row are one.
+    # Adjacent parts are joined.
     goes_on = np.concatenate([[False], is_outside[1:] & is_outside[:-1] & (line[1:] == line[:-1])])
     first = np.flatnonzero(is_outside & ~goes_on)
     last = np.flatnonzero(is_outside & ~np.append(goes_on[1:], False))
@@ -639,7 +639,7 @@ def parts_of(lines: Polylines) -> list[Polylines]:
         ring = Segments.of(lines[hole])
         points = midpoints(ring)
         for row in order.tolist():
-            # Most of them, as a hole may touch its outer path.
+            # Most midpoints, not all: a hole may touch its outer path.
             if 2 * np.count_nonzero(inside(points, Segments.of(lines[row]))) > len(points):
                 owner[hole] = row
                 break

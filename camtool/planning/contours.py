@@ -257,7 +257,7 @@ def with_starts(
         return path, any_vertex
     along = MeasuredPath.of(path)
     if rule == "corner":
-        # Where it turns back at once is the tip of a relief.
+        # A turn by almost 180 degrees is the tip of a relief, no corner.
         bend = np.abs(along.turns)
         turns = (bend > START_CORNER_RAD) & (bend < math.pi - START_CORNER_RAD)
         is_round = np.abs(along.segments.radius - away_mm) <= POSITION_EPS_MM

@@ -62,7 +62,7 @@ round that line alone."""
 def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing) -> DrawnEdges:
     """Return, for each row of a toolpath, what was drawn there. The rows belong to the runs (N,)
     of the steps, counted through all steps; `placed`: the drawing in the work frame."""
-    # One number, seen as many, until there is another.
+    # A broadcast constant until a row has another value.
     off_mm = np.broadcast_to(0.0, (len(toolpath), 2))
     edge = np.broadcast_to(np.int64(NO_EDGE), len(toolpath))
     columns = [(*np.empty((2, 0, 2, 2)), *np.empty((2, 0), dtype=np.bool_))]
@@ -80,7 +80,7 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
             edge = edge if edge.flags.writeable else edge.copy()
             own_edges = edges.of_run[runs[rows] - first]
             edge[rows] = np.where(own_edges >= 0, own_edges + sum(map(len, lines)), own_edges)
-        # What clears the rest of another one makes its lines with it.
+        # An operation that clears a rest cuts the same lines as the operation that left it.
         before = max((int(line.max(initial=-1)) + 1 for line in lines), default=0)
         before = before_of.setdefault(step.operation.rest or step.operation.name or number, before)
         lines.append(edges.line + before)

@@ -117,12 +117,12 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     contour, or into the allowance that is left on it."""
     radius, allowance = operation.wall_radius_mm, operation.allowance_mm
     if operation.stage == "rough":
-        allowance = 0.0  # what roughing takes of it is not missed
-    bevel = operation.chamfer_mm or 0.0  # edges of others are not to be broken
+        allowance = 0.0  # the finishing pass would remove it anyway
+    bevel = operation.chamfer_mm or 0.0  # a bevel must not break the edges of other contours
     beside_items = list(_centre_paths(work))
     seen_sides, sided = sides.seen_by(operation), sides.sided()
     is_wall = sided | seen_sides.bounds
-    # Those of one operation with the side auto are offset together.
+    # Contours of one operation with side = "auto" are offset together.
     own_rows = set(chosen.source.tolist())
     if operation.side == "auto":
         is_wall = is_wall.copy()

@@ -93,7 +93,7 @@ def link(
             _add_section(builder, runs, done_count)
             done_count += len(runs)
             continue
-        if builder.position[2] > heights[0]:  # from where tools are changed, not down aslant
+        if builder.position[2] > heights[0]:  # from the place of the tool change, not on a slope
             builder.rapid(*_rounded(runs.vertices[0, :2]).tolist())
         for run_lot in _lots(runs):
             _add_cuts(builder, run_lot, done_count, heights, approach)

@@ -200,7 +200,7 @@ def flat_path(vertices: Floats) -> Polyline | None:
     vertices_kept: list[Floats] = []
     for vertex in vertices[:, [0, 1, 3]]:
         if vertices_kept and np.hypot(*(vertex[:2] - vertices_kept[-1][:2])) <= POSITION_EPS_MM:
-            vertices_kept.pop()  # the later one knows the bulge of the move that leads away
+            vertices_kept.pop()  # the later one has the bulge of the move that leads away
         vertices_kept.append(vertex)
     return Polyline(np.array(vertices_kept)) if len(vertices_kept) > 1 else None
 
@@ -253,7 +253,7 @@ def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
     heads = np.flatnonzero(_begins_move(segments, _continues(segments, end_z - z, feed)))
     if len(heads) == 0:
         return Cuts(run, np.empty((0, 3)), np.empty((0, 2)), np.empty(0, dtype=np.bool_), feed)
-    # The longest arc of those that are one knows the centre best.
+    # Of the joined arcs the longest has the most exact centre.
     size = np.abs(segments.sweep)
     counts = np.diff(np.append(heads, len(rows)))
     longest = np.flatnonzero(size == np.repeat(np.maximum.reduceat(size, heads), counts))

@@ -204,7 +204,7 @@ def _box_slack(drawing: Drawing, job: Job, frame_map: AffineMap) -> Floats:
         is_chosen[paths] = True
         off_mm = off_mm[np.repeat(is_chosen, np.diff(drawing.paths.offsets))]
     lines = Polylines(frame_map.vertices(lines.vertices), lines.offsets, lines.closed)
-    low = np.full((3, 2), np.inf)  # of what is there, and of what may have been drawn
+    low = np.full((3, 2), np.inf)  # of the fitted curves, and bounds of the exact ones
     high = -low
     every = segment_rows(lines)
     for first in range(0, len(every), SEGMENTS_AT_ONCE):
@@ -388,7 +388,7 @@ def _map_drawing(drawing: Drawing, maps: list[AffineMap]) -> Drawing:
     return replace(
         drawing,
         paths=paths,
-        # What left points that went now leaves the one before them.
+        # Segments that began at a removed point now begin at the point before it.
         off_mm=np.maximum.reduceat(off_mm, kept_vertices, axis=0)
         if len(kept_vertices)
         else off_mm,
@@ -449,7 +449,7 @@ def _map_unchosen(unchosen: Unchosen, maps: list[AffineMap]) -> Unchosen:
     points."""
     try:
         paths, rows, _ = _map_lines(unchosen.paths, maps)
-    except OptionError:  # nothing is left of them; what is chosen has been placed already
+    except OptionError:  # none is left; the chosen paths are placed already
         return Unchosen()
     copy, path = np.divmod(rows, max(1, len(unchosen.paths)))
     copies = list(zip(copy.tolist(), path.tolist(), strict=True))

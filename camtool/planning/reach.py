@@ -178,7 +178,8 @@ class _Parts(Struct, frozen=True, eq=False):
         length, distances = np.roll(self.length, -turn), np.roll(self.distances, -turn)
         begin = np.concatenate([[0.0], np.cumsum(length)]) + self.length[:turn].sum()
         first, last = true_ranges(np.roll(self.is_wanted, -turn))
-        # The path begins with a part that is not wanted, so that every other one is wanted.
+        # The path is rotated to begin with an unwanted part, so that wanted and unwanted
+        # alternate.
         edges = np.column_stack([first, last]).ravel()
         farthest = np.maximum.reduceat(np.append(distances, 0.0), edges)[::2]
         large = 2.0 * (begin[last] - begin[first]) * farthest >= least_mm2

@@ -304,7 +304,7 @@ class Division(Struct, frozen=True, eq=False):
         index = np.arange(first, last) % len(self.parts)
         columns, spread_mm = [], 0.0
         for reversals, residual in zip(self.reversals, self.residual, strict=True):
-            # An axis that stands still came in its better direction.
+            # An axis that stands still was approached in its better direction.
             sense = direction * int(np.sign(reversals.sense[index].sum())) or residual.better
             columns.append(int(sense > 0))
             if sense != residual.better:

@@ -255,7 +255,7 @@ def levels(
         _check_last(depth_mm, step_down_mm, last_pass_mm)
         rest_mm = depth_mm - last_pass_mm
     step = math.inf if step_down_mm is None else step_down_mm
-    # What rounding alone leaves above the last pass is no pass.
+    # A remainder above the last pass that is only rounding gets no pass of its own.
     if rest_mm <= PASS_SLACK * depth_mm:
         return (-depth_mm,)
     passes = rest_mm / step * (1.0 - PASS_SLACK)

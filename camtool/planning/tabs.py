@@ -281,7 +281,7 @@ def raise_profile(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> 
         return points
     result: ZProfile = []
     for (begin, z_begin), (end, z_end) in pairwise(points):
-        # Only passes below its top know of a tab.
+        # Only passes below its top are raised by a tab.
         near_tabs = [
             tab
             for tab in _tabs_between(tabs, total_mm, min(begin, end), max(begin, end))
@@ -415,7 +415,7 @@ class _Fitting(Struct, frozen=True, eq=False):
         offsets = places - centre
         if self.along.path.closed:
             offsets = (offsets + 0.5 * total) % total - 0.5 * total
-        # Of two that are as near the one ahead, whatever rounding says.
+        # Of two equally near places the one ahead comes first, regardless of rounding.
         distances = np.round(np.abs(offsets) / total, PLACE_DECIMALS)
         return np.asarray(places[np.lexsort([offsets < 0.0, distances])])
 
@@ -687,7 +687,8 @@ def _tabs_over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> 
                 first, _, was_deep = spans.pop()
                 is_deep = is_deep or was_deep
             spans.append((first, last, is_deep))
-    # What is up already, by a tab of its own, belongs to the piece: it does not go down between.
+    # Parts already raised by the run's own tab belong to the piece, so that it does not go down
+    # between.
     for first, last, is_deep in spans:
         if is_deep:
             yield Tab(first, last, bridge.top_mm, bridge.fall)

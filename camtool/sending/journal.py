@@ -96,7 +96,7 @@ class Journal:
 
     def _begin_anew(self) -> None:
         """Remove the lines of an earlier program from the file."""
-        with suppress(OSError):  # what is no file has nothing to drop
+        with suppress(OSError):  # a pipe or device cannot be truncated
             os.lseek(self._handle, 0, os.SEEK_SET)
             os.ftruncate(self._handle, 0)
         self._add(self._head, sync=False)

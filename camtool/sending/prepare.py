@@ -353,7 +353,7 @@ def rest_of(
             mend="choose the block at the beginning of a contour",
         )
     ends, entry_end = pairs
-    # A block of the program is done when all moves up to its last one are.
+    # A block of the program is done when all its moves are.
     moves = np.flatnonzero(wanted_path.is_motion)
     last = np.append(wanted_path.block[moves[1:]] > wanted_path.block[moves[:-1]], True)
     done_blocks = np.full(int(reread.block.max()) + 1, -1)
@@ -449,9 +449,9 @@ def _plunge_feed(decoded: Toolpath, low: int, target: LoadedTarget) -> float:
 
 
 class _MovePairs:
-    """Pairs of moves: those of a program (`wanted`) and those of what was written for them after
-    an entry (`reread`). They are equal, or, where the writer splits a move, lines that lie on it;
-    moves shorter than the resolution of the dialect may be missing."""
+    """Pairs of moves: those of a program (`wanted_path`), and those that were written for them
+    after an entry and read back (`reread`). Both are equal, or, where the writer splits a move,
+    lines that lie on it; moves shorter than the resolution of the dialect may be missing."""
 
     def __init__(self, wanted_path: Toolpath, reread: Toolpath, target: LoadedTarget) -> None:
         machine = target.machine

@@ -108,7 +108,7 @@ def _durations(path: Toolpath, machine: Machine) -> Floats:
     for index, axis in enumerate(machine.axes):
         if axis.max_rate_mm_min is not None:
             min_seconds = 60.0 * travel[:, index] / axis.max_rate_mm_min
-            turns = path.is_arc & (index < 2)  # Z of a helix moves evenly
+            turns = path.is_arc & (index < 2)  # Z moves evenly along a helix
             seconds = np.where(turns, seconds, np.maximum(seconds, min_seconds))
     return np.where(path.kind == Kind.DWELL, path.value, seconds)
 

@@ -175,7 +175,7 @@ def planned_before(drawing: Drawing, job: Job, machine: Machine) -> StockBefore:
     leave; the uncut stock for a job that is no set-up."""
     if job.setup_of is None:
         return WHOLE
-    from camtool.planning.plan import planned  # all of planning, for set-ups alone
+    from camtool.planning.plan import planned  # loads all of planning, which only set-ups need
 
     part_job, own = job.setup_of
     names = [each.name for each in part_job.setups]
@@ -200,7 +200,7 @@ def least_remaining(tree: StockTree, before: StockBefore, box_mm: Box) -> Bracke
     def upper(squares: Floats) -> Floats:
         low = np.minimum(tree.min_heights(squares), before.least_tops(squares)).clip(min=bottom)
         high = np.minimum(tree.max_heights(squares), before.greatest_tops(squares))
-        # Where one is cut through all over a square, nothing is left that could meet.
+        # If one face is cut through all over a square, nothing is left where both could meet.
         is_between = (low < TOP_MM) & (high > bottom + THROUGH_SLACK_MM)
         is_between &= before.least_floors(squares) < TOP_MM - THROUGH_SLACK_MM
         floor = before.greatest_floors(squares).clip(max=TOP_MM)

@@ -184,7 +184,7 @@ def difference_of(first: CutStock, second: CutStock, limit_mm: float) -> StockDi
     greater one is determined to within `TRIAL_SHARE` of the limit."""
     box = box_around(first.box_mm, second.box_mm)
     slack_mm3 = DIFFERENCE_SHARE * max(first.removed_mm3().high, second.removed_mm3().high)
-    # What both cut is no difference: of each only the moves that the other has not are compared.
+    # Moves that both have make no difference: only moves that the other lacks are compared.
     added_cuts, less = _own_moves(second.moves, first.moves), _own_moves(first.moves, second.moves)
     return StockDifference(
         _distance(first.tree, added_cuts, box, limit_mm),
@@ -234,7 +234,7 @@ def _distance(one: StockTree, other: StockTree, box: Box, limit_mm: float) -> Br
     if bracket.low <= 0.0:
         high = limit_mm - tolerance_mm + bracket.high
         return Bracket(0.0, high, bracket.at_mm, bracket.squares)
-    # No distance is more than a difference in depth; where it is less, a wall has moved.
+    # A distance is at most the difference in depth; where it is less, a wall has moved.
     low, place, squares = limit_mm - tolerance_mm, bracket.at_mm, bracket.squares
     high = low + bracket.high
     while high - low > tolerance_mm:

@@ -165,7 +165,7 @@ def engagement_of(
     is_low = low < STOCK_TOP_MM - TOUCH_MM
     is_upright = length <= STEEP_SHARE * np.abs(moves.end[:, 2] - moves.start[:, 2])
     down = moves.end[:, 2] < moves.start[:, 2] - LEVEL_MM * length
-    # Straight up a tool is where it was.
+    # A tool that goes straight up cuts nothing new.
     cuts = is_low & is_straight & (radius > 0.0) & (down | ~is_upright)
     is_known = ~is_low | (is_straight & (radius > 0.0)) | is_upright
     result = np.full(len(moves), np.nan)
@@ -194,7 +194,7 @@ def engagement_of(
         )
         if counts:
             greatest[own] = max(greatest[own], result[part].max())
-    # A way down that keeps the limit is none: a link that was lifted, and may touch the stock.
+    # A way down that keeps the limit is no entry, but a lifted link that may touch the stock.
     excused = np.where(limit < np.pi, limit, 0.0)[number]
     is_entry = _behind(down & (np.nan_to_num(result) > excused), length, radius)
     return Engagement(result, is_entry, is_known, moves)

@@ -153,7 +153,7 @@ def greatest_value(
             quarters = divided(squares[open_])
             bounds = np.repeat(bounds[open_], 4)
             if math.isinf(enough_value):
-                # The most promising squares are looked at first: they raise the best value soon.
+                # The most promising squares come first, since they raise the best value soon.
                 order = np.argsort(bounds, kind="stable")
                 quarters, bounds = quarters[order], bounds[order]
             pile.append((quarters, bounds))

@@ -100,7 +100,7 @@ def loose_pieces(
         _Level(floor, *_through_cuts(moves, floor))
         for floor in _floors(moves, thickness_mm, before)
     ]
-    # Of whole stock only what is cut through can come loose.
+    # From uncut stock a piece can come loose only by cuts through it.
     has_others = bool(before.above or before.below)
     cuts = moves.select(moves.table[moves.tool, 0] > 0.0) if has_others else levels[0].cuts
     across = (cuts.start[:, :2] != cuts.end[:, :2]).any(axis=1)
@@ -211,7 +211,7 @@ class _Raster(Struct, frozen=True, eq=False):
             )
             assert drawn.owner is not None
             number = np.append(level.number[is_chosen][kept_moves], STANDING)
-            time = number[drawn.owner]  # the last for cells that nothing cuts
+            time = number[drawn.owner]  # the last entry is for cells that nothing cuts
             if not (self.before.above or self.before.below):
                 return drawn, time
             if first_cuts is None:

@@ -179,7 +179,8 @@ def _least_distance(judge: Callable[[float], Gouges | Leftovers], limit_mm: floa
                 low, place = trial_mm, trial.at_mm
         if failed_mm <= 0.0:
             break
-        # Over one place the excess falls as the distance grows: a floor needs no more than it.
+        # At one place the excess falls as the distance grows, so for a floor the excess itself is
+        # a sufficient distance.
         if not guess_mm and 0.0 < trial.excess_mm < min(high, 2.0 * failed_mm):
             trial_mm = guess_mm = trial.excess_mm + EPS_MM
         elif high == guess_mm and failed_mm < FLOOR_SHARE * high:
@@ -396,7 +397,7 @@ def _allows(layer: WantedLayer, chords: _Chords, table: Floats, distance_mm: flo
     nearest, farthest = layer.along(chords.middle, chords.half)
     s, deep = nearest + distance_mm, STOCK_TOP_MM - chords.z
     radius, flat, corner, rise = (column[:, None] for column in table[chords.tool].T)
-    # What cuts less than the distance below the top is fine. The width there is a concave function
+    # A cut less than the distance below the top is fine. The width there is a concave function
     # of the depth: below its tangents.
     cut = deep - distance_mm
     deepest = cut.max(axis=1, keepdims=True)
@@ -483,7 +484,7 @@ class Leftovers:
         moves = self.stock.moves.select(np.isin(self.stock.moves.tool, same))
         probes = (CutterProfile(near, near),) * len(moves.cutters)
         tree = stock_tree(replace(moves, cutters=probes))
-        # The deepest that a tip must get over the places across the groove.
+        # The greatest depth that the tip must reach, over all distances across the groove.
         kinks = [0.0, cutter.flat_mm, layer.shift_mm]
         if layer.rise:
             kinks.append(layer.shift_mm - (layer.depth_mm - layer.base_mm) / layer.rise)

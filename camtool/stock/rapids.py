@@ -161,7 +161,7 @@ class _Search:
         self.feeds = moves.select(~moves.rapid)
         self.tree = stock_tree(self.feeds)
         self.before = np.cumsum(~moves.rapid, dtype=np.int64)[chosen]
-        # What is above the stock top touches nothing.
+        # Parts above the stock top touch nothing.
         self.rapids = moves.select(chosen).below(STOCK_TOP_MM)
         self.columns = move_columns(self.rapids)
         self.tools: Floats = moves.table[self.rapids.tool]

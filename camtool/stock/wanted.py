@@ -253,13 +253,13 @@ def wanted_solid(steps: Sequence[Step], wall_mm: float = DEFAULT_WALL_MM) -> Wan
     highest_mm = max((_tabs_mm(step.operation) for step in steps), default=0.0)
     for step in steps:
         if step.operation.tool.radius_at(-step.setting.levels_mm[-1]) > 0.0:
-            # The tabs of other operations stand in its way too.
+            # The tabs of other operations may stand in its way too.
             shares = step.operation.stage == "finish" or any(
                 finding.code is PlanningCode.TAB_SHARED for finding in step.findings
             )
             maker = _Layers(step, highest_mm if shares else _tabs_mm(step.operation))
             may += maker.may()
-            # The rest of what another program clears is not all that is to be cleared.
+            # If another program clears the region, its rest alone is not all that must be cut.
             if not step.operation.rest or step.operation.rest in names:
                 must += maker.must()
     return WantedSolid(tuple(may), tuple(must), wall_mm)
@@ -313,7 +313,7 @@ class _Layers:
                 box = Polyline(np.array(corners, dtype=np.float64), closed=True)
                 yield self._straight(Polylines.of([box]), INSIDE, self._floor_mm)
         elif contract.cuts == "at":
-            if contract.takes in DRILLED:  # others may cut anywhere along their lines
+            if contract.takes in DRILLED:  # other kinds may cut anywhere along their lines
                 yield from self._holes()
         elif contract.cuts == "within" and contract.leaves_walls:
             if tool.kind in MILLS:

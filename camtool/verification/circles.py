@@ -127,7 +127,7 @@ def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
     if len(filled) < MIN_BINS:
         return NO_FIGURES
     smallest, largest = np.sqrt(filled[:, 3]), np.sqrt(filled[:, 6])
-    # The points of a bin that does not reach from edge to edge make a shorter arc.
+    # The points of a bin that is only partly covered span a shorter arc.
     mean = np.clip(mean_radii(bins)[bins[:, 0] > 0.0], smallest, largest)
     return CircleFigures(
         circular_mm=circular_error(filled),

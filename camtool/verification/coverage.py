@@ -205,7 +205,7 @@ def _contours_from(cuts: CutMoves, goal: CutMoves, row_from: Indices | None) -> 
         wanted_contour = np.where(row_from[rows] >= 0, goal.contour[row_from[rows]], ANY_CONTOUR)
         pair_base = (
             len(of_wanted) + 1
-        )  # contours follow one another: pairs as numbers are mostly in order
+        )  # contours come in order, so these numbers are mostly sorted
         pair = cuts.contour[rows].astype(np.int64) * pair_base + (wanted_contour - ANY_CONTOUR)
         changes = np.flatnonzero(np.diff(pair, prepend=-1))
         decoded_contours, wanted_contours = np.divmod(distinct(pair[changes]), pair_base)

@@ -276,7 +276,7 @@ def _sample_batches(
     segments = np.flatnonzero(rows[cuts.row])
     parts = _parts(lengths[segments], spacing).astype(np.int32)
     del lengths
-    # What is whole ends where its last segment does.
+    # A row, or a group of rows, ends with its last segment.
     rows_of_segments = cuts.row[segments]
     last = np.append(
         np.diff(rows_of_segments if group is None else group[rows_of_segments]) != 0, True
@@ -326,7 +326,7 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
     rows = np.flatnonzero(cuts.is_cut & ~np.append(is_whole, True)[cuts.contour]).astype(np.int32)
     begins = np.flatnonzero(np.diff(cuts.contour[rows], prepend=-1))
     toolpath = cuts.toolpath
-    # Of each contour the places where it begins and where its rows end; sizes stand at the latter.
+    # Places of each contour: its begin and the ends of its rows. Sums belong to the latter.
     offsets = np.append(begins, len(rows)) + np.arange(len(begins) + 1)
     places, sums = np.empty((offsets[-1], 2)), np.zeros((offsets[-1], 2))
     places[offsets[:-1]] = toolpath.starts_of(rows[begins])[:, :2]
@@ -336,7 +336,7 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
         places[end_rows] = toolpath.end[rows[batch], :2]
         sums[end_rows] = _lengths_and_areas(toolpath, rows[batch])
     latest = latest_near(places, offsets, gap_mm)
-    # Most contours without a loop are lines that come back nowhere.
+    # Most contours without a loop never come back to an earlier place.
     for run in np.flatnonzero(np.maximum.reduceat(latest, offsets[:-1]) >= 0).tolist():
         low, high = offsets[run], offsets[run + 1]
         np.cumsum(sums[low:high], axis=0, out=sums[low:high])

@@ -118,7 +118,8 @@ class SlideExtents:
             extreme.at(extent, contour[counts], part[counts])
             extreme.at(extent, contour[begins], places[:-1][begins])
         for ends, places_kept in zip(self._ends, self._places, strict=True):
-            # A place behind the last row of a block is that before the first of the next.
+            # The place after the last row of a block is the place before the first row of the
+            # next.
             one, other = np.searchsorted(ends, [low, low + len(end) + 1])
             places_kept[one:other] = places[ends[one:other] - low]
 

@@ -141,7 +141,7 @@ def _first_at_least(count_wanted: int, guess: int, count: Callable[[int], int]) 
     return high
 
 
-# Figures of rows: taken from the judge's columns some rows at a time, and only their sums kept.
+# Figures of rows: taken from the judge's columns in blocks of rows, of which only sums are kept.
 
 
 class RowBlock(Struct, frozen=True, eq=False):

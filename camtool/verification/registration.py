@@ -990,7 +990,7 @@ class _Follower(Struct, frozen=True, eq=False):
         count = len(tracks.paths)
         total_mm = np.bincount(cells.track, cells.length, minlength=count)
         uncut_mm = total_mm * (1.0 - cells.share(count))
-        # Of the variants of a contour the one of which most is cut says what is left of it.
+        # What is left of a contour is measured on its variant that is cut most.
         order = np.lexsort((uncut_mm, tracks.contour))
         first = order[np.flatnonzero(np.diff(tracks.contour[order], prepend=-1))]
         uncut_tracks = first[uncut_mm[first] >= MIN_LEFT_MM]
@@ -1295,7 +1295,8 @@ def _splice_tracks(
         parts.append((None, (kind, moves.end[span], moves.centre[span], moves.feed[span], k)))
         row_index, before = last, vertices[runs[k + 1] - 1, :2]
         if bent[across[np.searchsorted(across, last)]]:
-            # An arc keeps its start: a full turn that begins elsewhere would be none.
+            # An arc must keep its start: a full circle that began elsewhere would not be a full
+            # circle.
             parts.append((None, _link(toolpath.end[last - 1], moves.feed[low[k]], k)))
             before = toolpath.end[last - 1, :2]
     next_motion = int(across[np.searchsorted(across, row_index)])

@@ -42,7 +42,7 @@ def section_findings(
     begins = [*decoded.operations.begin.tolist(), len(decoded)]
     for index, step in turned:
         rows = (moves.row >= begins[index]) & (moves.row < begins[index + 1])
-        # Behind the way to the first cut, which begins where the tool happens to be.
+        # Without the way to the first cut, which begins wherever the tool happens to be.
         rows &= moves.row >= moves.row[rows & ~moves.rapid].min(initial=len(decoded))
         rows &= (moves.start != moves.end)[:, :2].any(axis=1)
         nose = step.operation.tool.radius_mm

@@ -468,7 +468,7 @@ def _swept_by_runs(runs: Sequence[tuple[Floats, Floats]], cutter: Cutter) -> Any
         np.concatenate(solid), indices=np.repeat(np.arange(len(count)), count)
     )
     flat, line = shapely.get_coordinates(
-        # Lines may cross themselves, before and after: the outline takes them as they are.
+        # Simplified lines may cross themselves, which the outline allows.
         shapely.simplify(lines, 0.5 * cutter.tolerance_mm, preserve_topology=False),
         include_z=True,
         return_index=True,

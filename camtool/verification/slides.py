@@ -212,7 +212,7 @@ class Tasks:
     def __init__(self, paths: Paths, match: Match, slot: Ints) -> None:
         """Index the wanted moves; `slot` (C,): the set of bins that each circle uses."""
         self._paths, self._match = paths, match
-        self._slot = np.append(slot, -1)  # the last one is for none, −1
+        self._slot = np.append(slot, -1)  # the last entry stands for index −1, none
         row = paths.wanted.row  # an arc of more than a half circle has two segments
         begins = np.diff(row, prepend=-1) != 0
         self._rows = row if begins.all() else row[begins]

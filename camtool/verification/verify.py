@@ -178,7 +178,7 @@ def compare_cuts(
     circles = full_circles(wanted_side.cuts, case.coverage_mm)
     goal = Goal(wanted_side.moves, circles, case.coverage_mm, case.depth_mm)
     conformance = _conformance(case, flat_cuts=flat_cuts)
-    # What conformance or registration found with its own tolerance is not found again.
+    # Faults that conformance or registration reports are not reported again.
     is_judged = case.registration is None and not (conformance and conformance.place)
     coverage = _coverage(
         case, (decoded, wanted_side), goal, flat_cuts=flat_cuts, is_judged=is_judged
@@ -380,7 +380,8 @@ class ReportBuilder(Struct, frozen=True, eq=False):
 
     def _circles(self) -> tuple[record.CircleReport, ...]:
         match, off_mm = self.coverage.match, np.zeros(len(self.slides.circles) + 1)
-        np.maximum.at(off_mm, match.circle, match.off_mm)  # the last one is for none, −1
+        # the last entry stands for index −1, none
+        np.maximum.at(off_mm, match.circle, match.off_mm)
         return tuple(
             record.CircleReport(
                 centre_mm=(rounded(circle.centre_mm[0]), rounded(circle.centre_mm[1])),

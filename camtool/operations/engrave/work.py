@@ -87,7 +87,7 @@ def widest_groove(lines: Polylines, width: float) -> tuple[float, Any, int, int]
     chords = _chords(lines, width)
     all_places = narrow_places = _narrow_places(chords, lines.closed, width)
     fits = None
-    while narrow_places:  # what touches in a wide groove may be apart in a narrower one
+    while narrow_places:  # lines that touch in a wide groove may be apart in a narrower one
         fits = min(narrow_places, key=lambda each: each[0])
         narrow_places = _narrow_places(chords, lines.closed, fits[0])
     return None if fits is None else (*fits, len(all_places))
@@ -117,7 +117,7 @@ def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float,
         )
         for a, b in ((near_rows[at_end], other[at_end]), (other[at_end], near_rows[at_end]))
     ]
-    # A line that ends there leaves at once; parallel ones stay beside each other.
+    # A line that ends at the other leads away at once; parallel lines stay beside each other.
     at_end[at_end] = np.minimum(*side_gaps) <= 2.0 * gaps[at_end]
     touching = at_end | (gaps < MIN_GAP_SHARE * width)
     group = _connected(len(lines), near_rows[touching], other[touching])

@@ -151,7 +151,7 @@ def _add_shape(chosen: Chosen, path_rows: list[int], setting: Setting, line_set:
     line_set.findings += shortened_list(list(joined), UNREACHED_BETWEEN_MORE)
     free_side = reverse_lines(shape)
     line_set.findings += cut_away_findings(shape, setting.operation)
-    if setting.operation.beyond_mm:  # it reaches where it is to cut beyond the lines
+    if setting.operation.beyond_mm:  # the tool also reaches what it cuts beyond the lines
         free_side = offset_shape(free_side, -setting.operation.beyond_mm)
     as_wide = any(finding.code == PlanningCode.SLOT_AS_WIDE for finding in line_set.findings)
     hair_mm = 2.0 * SLOT_TOLERANCE_MM if as_wide else 0.0
@@ -204,7 +204,7 @@ def _missing(
     """Add lines along paths of a shape (`missing`, reduced in place) in which only a tool thinner
     by SLOT_TOLERANCE_MM has room, such as slots as wide as the tool, and findings for the paths
     that have no room even so."""
-    # What is as wide as the tool has room for one that is thinner by a hair.
+    # A slot as wide as the tool has room for a slightly thinner one.
     paths = _offset(shape, max(setting.operation.away_mm - SLOT_TOLERANCE_MM, 0.0), setting)
     for path, along in zip(paths, _sources(paths, shape), strict=True):
         if missing.issuperset(along):

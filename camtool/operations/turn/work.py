@@ -261,7 +261,7 @@ def _runs(section: Floats, setting: Setting, name: str) -> tuple[list[CutRun], l
     go(float(finish[0, 0]), float(finish[0, 1]), feed)
     for (x, y, _), bulge in zip(finish[1:].tolist(), finish[:-1, 2].tolist(), strict=True):
         go(x, y, feed, bulge)
-    # Away from the shoulder first, which the passes before have left there.
+    # First away from the shoulder that the passes before have left there.
     go(places[-1][0] + 0.5 * clear, places[-1][1] + 0.5 * clear, RAPID)
     go(places[-1][0], home[1], RAPID)
     go(*home, RAPID)

@@ -244,8 +244,8 @@ def _limited(
 
 
 class Band(Struct, frozen=True):
-    """The disc radii that one pass cuts, mm: above `low`, which the pass before has cut, up to
-    `high`; and the tolerance of fitted arcs, mm."""
+    """The disc radii that one pass cuts, mm: above `low_mm`, which the pass before has cut, up to
+    `high_mm`; and the tolerance of fitted arcs."""
 
     low_mm: float
     high_mm: float
