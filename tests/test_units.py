@@ -55,8 +55,7 @@ def test_any_text_gives_a_finite_number_or_an_option_error(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "mm_min"),
-    [("0.8", 0.8), ("0.8mm/min", 0.8), ("0.01 mm/s", 0.6), ("2in/min", 50.8)],
+    ("text", "mm_min"), [("0.8", 0.8), ("0.8mm/min", 0.8), ("0.01 mm/s", 0.6), ("2in/min", 50.8)]
 )
 def test_feeds(text: str, mm_min: float) -> None:
     assert parse_feed(text) == pytest.approx(mm_min, rel=1e-12)

@@ -11,12 +11,7 @@ import numpy as np
 import pytest
 
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.lower import (
-    LoweredToolpath,
-    arcs_to_lines,
-    arcs_within,
-    xy_then_z,
-)
+from camtool.toolpath.lower import LoweredToolpath, arcs_to_lines, arcs_within, xy_then_z
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.dense_moves import cut
 from tests.oracles.path_machine import both, path_machine

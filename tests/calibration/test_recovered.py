@@ -99,8 +99,7 @@ TELLS_SQUARENESS = {"squares", "circles"}
 
 
 @pytest.mark.parametrize(
-    ("kind", "backwards"),
-    [*((kind, False) for kind in KINDS), ("squares", True)],
+    ("kind", "backwards"), [*((kind, False) for kind in KINDS), ("squares", True)]
 )
 @examples(15)
 @given(machine=FAULTS)

@@ -96,10 +96,7 @@ BASES: Mapping[str, tuple[str, ...]] = {
     "tolerances new": ("-o", "-"),
     "tolerances show": ("--against", DRAWING),
     "coupon": ("-t", "linuxcnc", "-o", "out.svg"),
-    "calibrate": (
-        "-t",
-        "linuxcnc",
-    ),
+    "calibrate": ("-t", "linuxcnc"),
 }
 """Flags that each command needs."""
 

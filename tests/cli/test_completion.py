@@ -140,10 +140,7 @@ def test_an_answer_loads_nothing_heavy() -> None:
         "import sys, atexit; atexit.register(lambda: print('LOADED', *sys.modules)); "
         "from camtool.cli.main import main; main()"
     )
-    asked = {
-        COMPLETE: "bash_complete",
-        "COMP_WORDS": f"camtool post {LOGO} --layer E",
-    }
+    asked = {COMPLETE: "bash_complete", "COMP_WORDS": f"camtool post {LOGO} --layer E"}
     result = subprocess.run(
         [sys.executable, "-c", code],
         env=environment(**asked),

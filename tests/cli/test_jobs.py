@@ -13,17 +13,7 @@ import pytest
 from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.jobs.build import JobTables, build_job, read_job_file
 from camtool.jobs.keys import OPERATION, PLACE, TOOL_KEYS, WHOLE
-from camtool.planning.job import (
-    Entry,
-    Job,
-    Lead,
-    Operation,
-    Placement,
-    Stock,
-    Tabs,
-    Tool,
-    job_of,
-)
+from camtool.planning.job import Entry, Job, Lead, Operation, Placement, Stock, Tabs, Tool, job_of
 from tests.cli.conftest import ROOT, Run
 
 WHOLE_FILE = """
@@ -154,12 +144,7 @@ EXPECTED = Job(
         ),
     ),
     placement=Placement(
-        (1.0, 2.0),
-        "y",
-        math.radians(90.0),
-        fit_mm=(8.0, 0.0),
-        copies=(3, 2),
-        pitch_mm=(12.0, 9.0),
+        (1.0, 2.0), "y", math.radians(90.0), fit_mm=(8.0, 0.0), copies=(3, 2), pitch_mm=(12.0, 9.0)
     ),
     stock=Stock(2.0, (-1.0, -2.0), (10.0, 50.0)),
     safe_z_mm=0.5,
@@ -413,11 +398,7 @@ def test_help_is_instant() -> None:
         ("breakthrough = '0.3mm'", {"depth": "2mm"}, [2.0]),
         ("depth = 2", {"breakthrough": "0.2mm"}, [3.2]),
         ("breakthrough = 1", {}, [4.0]),
-        (
-            "kind = 'drill'\nbreakthrough = 0.1\ntool_diameter = 1\ntool_tip_angle = 90",
-            {},
-            [3.6],
-        ),
+        ("kind = 'drill'\nbreakthrough = 0.1\ntool_diameter = 1\ntool_tip_angle = 90", {}, [3.6]),
         ("kind = 'drill'\nbreakthrough = 0.1\ntool_diameter = 1", {}, [3.1]),
     ],
 )

@@ -214,11 +214,7 @@ def test_wrong_set_ups_are_refused_with_their_place(
     assert "setups" in done.stderr.decode()
 
 
-ZERO = {
-    "stock-lower-left": (0.0, 0.0),
-    "stock-upper-right": (WIDE, HIGH),
-    "4, -3mm": (4.0, -3.0),
-}
+ZERO = {"stock-lower-left": (0.0, 0.0), "stock-upper-right": (WIDE, HIGH), "4, -3mm": (4.0, -3.0)}
 
 
 def test_a_set_up_may_have_its_own_zero(camtool: Run, tmp_path: Path) -> None:

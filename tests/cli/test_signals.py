@@ -76,11 +76,7 @@ def test_several_files_at_once(camtool: Run, line: Path, tmp_path: Path) -> None
     ],
 )
 def test_what_cannot_be(
-    camtool: Run,
-    line: Path,
-    tmp_path: Path,
-    flags: tuple[str, ...],
-    message: str,
+    camtool: Run, line: Path, tmp_path: Path, flags: tuple[str, ...], message: str
 ) -> None:
     result = camtool("signals", str(line), *AT_3_MS, *flags)
     assert result.returncode == 2

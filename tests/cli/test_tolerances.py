@@ -78,7 +78,7 @@ def test_without_a_drawing_sizes_are_as_drawn(camtool, tmp_path):
     (tmp_path / "t.toml").write_text(BORE + 'limits = "H7"', encoding="utf-8")
     shown = camtool("tolerances", "show", "t.toml")
     assert shown.stdout.decode().split() == [
-        *("diameter", "1", "diameter", "as", "drawn", "H7", "t.toml,", "dimension", "1"),
+        *("diameter", "1", "diameter", "as", "drawn", "H7", "t.toml,", "dimension", "1")
     ]
 
 

@@ -170,11 +170,7 @@ def test_the_nearest_library_counts(
         (LIBRARY, ("--tool", "mil"), "did you mean mill?"),
         (LIBRARY, ("--tool", "5"), "there is no tool 5"),
         (LIBRARY, ("--tool", "mill", "--material", "bras"), "did you mean brass?"),
-        (
-            LIBRARY,
-            ("--tool-diameter", "1", "--material", "brass"),
-            "no tool of the job has",
-        ),
+        (LIBRARY, ("--tool-diameter", "1", "--material", "brass"), "no tool of the job has"),
         (LIBRARY + "feeds = 3", ("--tool", "mill"), "presets.brass], key feeds: unknown key"),
         (LIBRARY.replace("0.4mm/min", "-1"), ("--tool", "mill"), "key feed: feed -1 mm/min"),
         (LIBRARY.replace('"..0.05mm"', '["2mm", "1mm"]'), ("--tool", "mill"), "is no range"),

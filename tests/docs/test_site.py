@@ -151,8 +151,7 @@ def test_pages_are_whole_in_a_browser(site: Path) -> None:
         assert page.evaluate(FAULTS) == ["data:,none", "wider than the window"]
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.on(
-            "response",
-            lambda answer: faults.append(answer.url) if answer.status >= 400 else None,
+            "response", lambda answer: faults.append(answer.url) if answer.status >= 400 else None
         )
         for file in sorted(site.rglob("index.html")):
             place = file.relative_to(site).as_posix()

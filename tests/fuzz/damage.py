@@ -98,14 +98,4 @@ def swapped(data: bytes, at: int, choice: int) -> bytes:
     return b"\n".join(lines)
 
 
-EVERY: tuple[Damage, ...] = (
-    cut,
-    headless,
-    flip,
-    insert,
-    line,
-    number,
-    without,
-    twice,
-    swapped,
-)
+EVERY: tuple[Damage, ...] = (cut, headless, flip, insert, line, number, without, twice, swapped)

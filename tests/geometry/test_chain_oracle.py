@@ -120,10 +120,7 @@ def test_fields_of_a_chessboard_are_contours_that_do_not_cross(seed: int) -> Non
     assert found.members == tuple(of for of, _ in wanted.paths)
 
 
-CHANGES = {
-    "moved": lambda p: moved(p, 31.5, -7.25),
-    "scaled": lambda p: scaled(p, 4.0),
-}
+CHANGES = {"moved": lambda p: moved(p, 31.5, -7.25), "scaled": lambda p: scaled(p, 4.0)}
 
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)

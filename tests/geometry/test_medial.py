@@ -24,10 +24,7 @@ pytestmark = pytest.mark.checked
 EXACT_MM = 1e-9
 TOLERANCE_MM = 1e-3
 NAMED = ["SQUARE", "ELL", "DUMBBELL", "KEYHOLE", "LENS", "CRESCENT", "NOTCH", "FILLETED", "SLOT"]
-ISLANDS = [
-    shapes.closed((3, 3), (3, 6), (6, 6), (6, 3)),
-    shapes.closed((12, 4, 1), (16, 4, 1)),
-]
+ISLANDS = [shapes.closed((3, 3), (3, 6), (6, 6), (6, 3)), shapes.closed((12, 4, 1), (16, 4, 1))]
 WITH_ISLANDS = oriented(Nesting(Polylines.of([shapes.OBLONG, *ISLANDS])))
 
 

@@ -77,9 +77,7 @@ TABLE = [
 
 
 @pytest.mark.parametrize(
-    ("paths", "parent", "depth"),
-    [row[1:] for row in TABLE],
-    ids=[row[0] for row in TABLE],
+    ("paths", "parent", "depth"), [row[1:] for row in TABLE], ids=[row[0] for row in TABLE]
 )
 def test_arrangements(paths: list[Polyline], parent: list[int], depth: list[int]) -> None:
     assert _nested(paths) == (parent, depth)

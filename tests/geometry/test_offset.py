@@ -11,13 +11,7 @@ import pytest
 
 from camtool.errors import GeometryError
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.measure import (
-    length,
-    path_extents,
-    point_at,
-    segment_lengths,
-    signed_area,
-)
+from camtool.geometry.measure import length, path_extents, point_at, segment_lengths, signed_area
 from camtool.geometry.offset import (
     Offset,
     Slices,
@@ -133,7 +127,7 @@ PAST_FAILURES: list[Case] = [
         ),
         -0.5,
         1,
-    ),
+    )
 ]
 
 
@@ -142,8 +136,7 @@ def rng() -> np.random.Generator:
 
 
 @pytest.mark.parametrize(
-    ("p", "d", "count"),
-    [pytest.param(*case[1:], id=case[0]) for case in CASES + PAST_FAILURES],
+    ("p", "d", "count"), [pytest.param(*case[1:], id=case[0]) for case in CASES + PAST_FAILURES]
 )
 def test_cases(p: Polyline, d: float, count: int) -> None:
     results = offset(p, d)

@@ -37,16 +37,10 @@ CASES = {
         path((0, 0), (1, 1), (2, 0), (2, 2), (1, 1), (0, 2)),
         0,
     ),
-    "crossing at a vertex of one passage": (
-        path((0, 0), (2, 2), (2, 0), (1, 1), (0, 2)),
-        1,
-    ),
+    "crossing at a vertex of one passage": (path((0, 0), (2, 2), (2, 0), (1, 1), (0, 2)), 1),
     "touching at a vertex of one passage": (path((0, 0), (4, 0), (4, 4), (2, 0), (0, 4)), 0),
     "a keyhole": (path((0, 0), (4, 0), (4, 4), (0, 4), (0, 2), (1, 2), (1, 1), (1, 2), (0, 2)), 0),
-    "a line through both arcs' bulges": (
-        path((0, 0, 1), (2, 0, 0), (2, -0.5), (0, -0.5)),
-        2,
-    ),
+    "a line through both arcs' bulges": (path((0, 0, 1), (2, 0, 0), (2, -0.5), (0, -0.5)), 2),
     "an arc that touches a line": (path((0, 0, 1), (2, 0, 0), (2, -1), (0, -1)), 0),
     "an arc back onto the line before it": (path((0, 0), (2, 0, 0.9), (1, 0), (1, 1)), 0),
     "an arc back through the line before it": (path((0, 0), (2, 0, -0.9), (1, 0), (1, 1)), 1),

@@ -226,7 +226,7 @@ def test_an_ellipse_of_equal_axes_is_an_exact_circle():
 def test_an_ellipse_whose_end_is_rounded_to_six_digits_is_closed():
     found = words(
         "ELLIPSE 100 AcDbEntity 8 0 100 AcDbEllipse 10 0 20 0 30 0 11 2 21 0 31 0 40 0.5 41 0 "
-        "42 6.283185",
+        "42 6.283185"
     )
     assert found.paths.closed.tolist() == [True]
     assert DrawingCode.GAP_CLOSED not in codes(found)
@@ -481,13 +481,7 @@ def test_what_is_no_line_is_counted_by_kind():
     found = drawn(doc)
     counts = {item.kind: item.count for item in found.skipped}
     assert counts.pop("INSERT", 1) == 1  # or deleted by the audit, which is told as a repair
-    assert counts == {
-        "TEXT": 2,
-        "HATCH": 1,
-        "RAY": 1,
-        "3DFACE": 1,
-        "entity": 1,
-    }
+    assert counts == {"TEXT": 2, "HATCH": 1, "RAY": 1, "3DFACE": 1, "entity": 1}
     assert len(found.paths) == 1
 
 

@@ -222,8 +222,7 @@ def test_shapes_with_wrong_numbers_are_left_out_and_named(body: str, message: st
 
 
 @pytest.mark.parametrize(
-    ("points", "message"),
-    [("1 2 3", "one coordinate is missing"), ("1 2 nan 4", "hold 'nan 4'")],
+    ("points", "message"), [("1 2 3", "one coordinate is missing"), ("1 2 nan 4", "hold 'nan 4'")]
 )
 def test_points_are_drawn_up_to_their_fault(points: str, message: str) -> None:
     rest = drawn(f'<polyline points="5 5 9 9 {points}"/>')

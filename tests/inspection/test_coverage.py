@@ -64,10 +64,7 @@ def calibrated(machine: Machine, result: Calibration) -> Machine:
     assert lean is not None
     mechanics = replace(machine.mechanics, squareness_rad=lean.value)
     return replace(
-        machine,
-        axes=replace(axes, **own),
-        mechanics=mechanics,
-        uncertainty=result.known,
+        machine, axes=replace(axes, **own), mechanics=mechanics, uncertainty=result.known
     )
 
 

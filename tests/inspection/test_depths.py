@@ -278,9 +278,7 @@ def test_a_through_cut_has_no_depth(tmp_path: Path) -> None:
     run = posted(tmp_path)
     deep = dimension("depth", (28.0, 12.0))
     thin = camtool.post(
-        tmp_path / "part.svg",
-        run.target,
-        camtool.read_job(_thinner(tmp_path / "part.toml")),
+        tmp_path / "part.svg", run.target, camtool.read_job(_thinner(tmp_path / "part.toml"))
     )
     found = inspect(thin, Tolerances((deep,)))
     said = [each.message for each in found.findings if "goes through the stock" in each.message]

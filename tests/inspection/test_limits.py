@@ -268,11 +268,7 @@ def test_any_words_give_limits_or_one_line(words):
     assert told.mend
 
 
-@given(
-    st.sampled_from("CDEFGH"),
-    st.integers(5, 11),
-    st.floats(0.1, 500.0, allow_nan=False),
-)
+@given(st.sampled_from("CDEFGH"), st.integers(5, 11), st.floats(0.1, 500.0, allow_nan=False))
 def test_a_hole_up_to_h_mirrors_the_shaft_of_its_letter(letter, grade, size):
     hole, shaft = (
         iso_limits(f"{letter}{grade}", size),

@@ -352,8 +352,7 @@ def test_what_a_change_makes_measurable_is_counted(tmp_path: Path) -> None:
     """The verdict of another job counts for a dimension that the original job leaves uncut, and
     the result states what the report states."""
     bench = Bench(
-        case(tmp_path, [limited(BORE, "-0.01/-0.03"), limited(WIDTH, "±0.05")]),
-        camtool_progress(),
+        case(tmp_path, [limited(BORE, "-0.01/-0.03"), limited(WIDTH, "±0.05")]), camtool_progress()
     )
     inner = bench.case.tables["operations"][0] | {"select": ["inner"]}
     bench.case.tables["operations"] = [inner]

@@ -40,11 +40,7 @@ EDGE = EdgeFeature(0, (0.0, 0.0), (8.0, 6.0))
 def swept(points: Floats, radius: float, row: int = 0, z: float = -1.0) -> SweptSegments:
     count = len(points) - 1
     return SweptSegments(
-        points[:-1],
-        points[1:],
-        np.full(count, radius),
-        np.full(count, z),
-        np.full(count, row),
+        points[:-1], points[1:], np.full(count, radius), np.full(count, z), np.full(count, row)
     )
 
 

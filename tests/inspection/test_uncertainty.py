@@ -254,10 +254,7 @@ def with_axis_x(machine: Machine, **values: float) -> Machine:
 
 def with_scatter(machine: Machine, x: float, y: float) -> Machine:
     axes = machine.axes
-    own = {
-        "x": replace(axes.x, repeatability_mm=x),
-        "y": replace(axes.y, repeatability_mm=y),
-    }
+    own = {"x": replace(axes.x, repeatability_mm=x), "y": replace(axes.y, repeatability_mm=y)}
     return replace(machine, axes=replace(axes, **own))
 
 
@@ -472,9 +469,7 @@ def test_exchanged_axes_exchange_the_budget() -> None:
     back = lambda variant: MachineVariant(exchanged(variant.machine), variant.wider_mm)  # noqa: E731
     one = propagate(bent, inputs_of(machine, 3.0), EDGES)
     other = propagate(
-        lambda variant: bent(back(variant)),
-        inputs_of(exchanged(machine), 3.0),
-        EDGES[:, :, ::-1],
+        lambda variant: bent(back(variant)), inputs_of(exchanged(machine), 3.0), EDGES[:, :, ::-1]
     )
     both = np.ix_(one.linear, one.linear)
     assert one.linear.sum() == 3

@@ -294,9 +294,7 @@ def test_what_is_not_cut_and_what_fits_nothing_are_findings(plate: Path) -> None
     assert done.report is not None
     assert [each.kind for each in done.report.inspection] == ["diameter"]
     some = camtool.post(
-        plate,
-        run.target,
-        job=camtool.job_of(tool_diameter_mm=2.0, select=("outer",)),
+        plate, run.target, job=camtool.job_of(tool_diameter_mm=2.0, select=("outer",))
     )
     done = inspect(some, Tolerances((HOLE, WIDTH)))
     assert InspectionCode.DIMENSION_NOT_CUT in {each.code for each in done.findings}

@@ -105,11 +105,7 @@ def test_layers_that_differ_in_case_are_one(tmp_path: Path) -> None:
 def test_one_layer_of_several_colours(tmp_path: Path) -> None:
     made = drawn((square(5), "0", "#ff0000"), (stroke(), "0", "#00ff00"), (stroke(), "0", ""))
     job = loaded(job_template(made), tmp_path)
-    assert told(job) == [
-        ("engrave", "#00ff00"),
-        ("engrave", "no colour"),
-        ("profile", "#ff0000"),
-    ]
+    assert told(job) == [("engrave", "#00ff00"), ("engrave", "no colour"), ("profile", "#ff0000")]
     for operation, colour in zip(job.operations, ("#00ff00", "", "#ff0000"), strict=True):
         taken = [c for c in ("#00ff00", "", "#ff0000") if operation.takes("0", c)]
         assert taken == [colour]

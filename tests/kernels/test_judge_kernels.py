@@ -25,12 +25,7 @@ from camtool.kernels.judging import (
 from camtool.kernels.move_tree import FIRST, LAST, LEAF, hilbert_order, move_tree
 from camtool.kernels.near import hilbert_places
 from tests.oracles import hilbert as oracle
-from tests.oracles.kernel_doors import (
-    fill_bins_,
-    nearest_errors_,
-    set_errors_,
-    shapes,
-)
+from tests.oracles.kernel_doors import fill_bins_, nearest_errors_, set_errors_, shapes
 from tests.oracles.near_moves import Arc, Line, Move, nearest, random_move
 
 pytestmark = pytest.mark.checked

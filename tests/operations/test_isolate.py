@@ -181,10 +181,7 @@ def test_nets_are_those_of_a_flood_of_pixels(seed: int) -> None:
         ends = (
             [[straight, -2.0], [straight, 10.0]]
             if random.random() < 0.5
-            else [
-                [-2.0, straight],
-                [10.0, straight],
-            ]
+            else [[-2.0, straight], [10.0, straight]]
         )
         paths.append(np.array(ends))
     z, copper = -0.1, 0.035

@@ -192,11 +192,7 @@ def test_the_picture_shows_both_sides_of_the_axis() -> None:
         SAMPLES / "screw.dxf", LATHE, camtool.read_job(SAMPLES / "screw.toml"), check=False
     )
     scene = scene_of(
-        title="",
-        drawing=run.drawing,
-        job=run.job,
-        toolpath=run.decoded,
-        machine=LATHE.machine,
+        title="", drawing=run.drawing, job=run.job, toolpath=run.decoded, machine=LATHE.machine
     )
     assert scene.drawing is not None
     assert extents(scene.drawing.paths).ravel().tolist() == [-2.6, 0.0, -0.6, 0.6]

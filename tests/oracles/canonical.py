@@ -102,13 +102,7 @@ def _move(name: str, values: list[float], modes: tuple[float, str, float], frame
     end[list(axes)] = values[0], values[1], values[5]
     centre[list(axes)] = values[2], values[3], 0.0
     return Move(
-        name,
-        frames.part(end * mm),
-        frames.part(centre * mm),
-        int(values[4]),
-        plane,
-        slack,
-        feed,
+        name, frames.part(end * mm), frames.part(centre * mm), int(values[4]), plane, slack, feed
     )
 
 

@@ -4,13 +4,7 @@ from camtool.findings import Code
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.verify import Case, Verification, VerifyOptions, judge
-from tests.oracles.dense_moves import (
-    circle,
-    cut,
-    follow,
-    pic_mmh,
-    square,
-)
+from tests.oracles.dense_moves import circle, cut, follow, pic_mmh, square
 from tests.targets import on
 
 MACHINE = pic_mmh()

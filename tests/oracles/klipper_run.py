@@ -59,11 +59,7 @@ class Move:
         self.mcr_delta_v2 = min(self.mcr_delta_v2, self.delta_v2)
 
     def calc_junction(self, before: Move) -> None:
-        limits = [
-            self.max_cruise_v2,
-            before.max_cruise_v2,
-            before.max_start_v2 + before.delta_v2,
-        ]
+        limits = [self.max_cruise_v2, before.max_cruise_v2, before.max_start_v2 + before.delta_v2]
         cosine = -sum(a * b for a, b in zip(self.ways, before.ways, strict=True))
         sine = math.sqrt(max(0.5 * (1.0 - cosine), 0.0))
         half_cosine = math.sqrt(max(0.5 * (1.0 + cosine), 0.0))

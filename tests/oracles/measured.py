@@ -99,10 +99,7 @@ def _square(corners: np.ndarray) -> dict[str, Any]:
     return {
         "dx_mm": float(upper_right[0] - upper_left[0]),
         "dy_mm": float(upper_left[1] - lower_left[1]),
-        "diagonals_mm": [
-            math.dist(lower_left, upper_right),
-            math.dist(upper_left, lower_right),
-        ],
+        "diagonals_mm": [math.dist(lower_left, upper_right), math.dist(upper_left, lower_right)],
     }
 
 

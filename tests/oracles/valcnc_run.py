@@ -99,11 +99,7 @@ class Valcnc:
         places: list[Place] = []
         for part in range(1, parts + 1):
             turned = theta + alpha * part / parts if ccw else theta - alpha * part / parts
-            to = (
-                centre[0] + radius * math.cos(turned),
-                centre[1] + radius * math.sin(turned),
-                z,
-            )
+            to = (centre[0] + radius * math.cos(turned), centre[1] + radius * math.sin(turned), z)
             if part == parts and self.forced_end:
                 to = (end[0], end[1], z)
             places += self.line(to)

@@ -50,12 +50,7 @@ def test_what_xml_cannot_hold_is_replaced() -> None:
 
 @pytest.mark.parametrize(
     ("sweep", "flags"),
-    [
-        (0.5, "0 1"),
-        (-0.5, "0 0"),
-        (math.pi + 0.1, "1 1"),
-        (-math.pi - 0.1, "1 0"),
-    ],
+    [(0.5, "0 1"), (-0.5, "0 0"), (math.pi + 0.1, "1 1"), (-math.pi - 0.1, "1 0")],
 )
 def test_flags_of_arcs(sweep: float, flags: str) -> None:
     data = PathData()

@@ -221,10 +221,7 @@ def test_full_circles_are_plotted_in_the_colours_of_the_page() -> None:
 
 
 def test_a_circle_in_both_directions_is_plotted_once() -> None:
-    both = (
-        replace(lobed(0.01), partner=2),
-        replace(lobed(0.01), ccw=True, partner=1),
-    )
+    both = (replace(lobed(0.01), partner=2), replace(lobed(0.01), ccw=True, partner=1))
     assert text_of(Scene("t", rounds=both)).count("<figure>") == 1
 
 

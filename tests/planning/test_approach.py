@@ -11,12 +11,7 @@ from hypothesis import strategies as st
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine, PathController, PlayCells, PlayMap
 from camtool.planning.items import CutRun
-from camtool.planning.reversing import (
-    APPROACH_MARGIN_MM,
-    Approaches,
-    approach_mm,
-    residuals,
-)
+from camtool.planning.reversing import APPROACH_MARGIN_MM, Approaches, approach_mm, residuals
 from camtool.records import replace
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL

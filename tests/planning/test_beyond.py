@@ -280,10 +280,7 @@ def test_what_is_thinner_than_two_allowances_is_told() -> None:
     plate, thin = _box(-5, -5, 20, 8), 0.08
     windows = [_box(0, 0, 4, 3), _box(4 + thin, 0, 8 + thin, 3)]
     settings = {"tool_diameter_mm": 2 * R, "allowance_mm": -0.05}
-    for paths, more in (
-        ([plate, *windows], {}),
-        ([_box(0, 0, 4, thin)], {"side": "outside"}),
-    ):
+    for paths, more in (([plate, *windows], {}), ([_box(0, 0, 4, thin)], {"side": "outside"})):
         found = contours(drawing_of(paths), job_of(**settings, **more))
         told = [each for each in found.findings if each.code == ProgramCode.GOUGE]
         assert len(told) == 1

@@ -16,16 +16,7 @@ from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
 from camtool.planning.checks import checked
 from camtool.planning.findings import PlanningCode
-from camtool.planning.job import (
-    Job,
-    KeepOutBox,
-    Lead,
-    Operation,
-    Placement,
-    Stock,
-    Tool,
-    job_of,
-)
+from camtool.planning.job import Job, KeepOutBox, Lead, Operation, Placement, Stock, Tool, job_of
 from camtool.planning.plan import plan, planned
 from camtool.records import replace
 from camtool.target.registry import load_target

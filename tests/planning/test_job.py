@@ -10,17 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.planning.job import (
-    Entry,
-    Job,
-    Lead,
-    Operation,
-    Placement,
-    Stock,
-    Tabs,
-    Tool,
-    job_of,
-)
+from camtool.planning.job import Entry, Job, Lead, Operation, Placement, Stock, Tabs, Tool, job_of
 
 NO_NUMBERS = (math.nan, math.inf)
 ABOVE_ZERO = (0.0, -1.0, *NO_NUMBERS)

@@ -128,11 +128,7 @@ def test_quarter_turns_and_mirrors_are_exact(
     st.tuples(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0)),
 )
 def test_every_shape_stays_similar(
-    path: Polyline,
-    mirror: str | None,
-    angle: float,
-    scale: float,
-    origin: tuple[float, float],
+    path: Polyline, mirror: str | None, angle: float, scale: float, origin: tuple[float, float]
 ) -> None:
     made = drawing_of([path])
     job = job_of(mirror=mirror, rotate_rad=angle, scale=scale, origin=origin)
@@ -154,8 +150,7 @@ def test_every_shape_stays_similar(
 
 
 @pytest.mark.parametrize(
-    ("fit", "scale"),
-    [((8.0, 8.0), 2.0), ((8.0, 3.0), 1.0), ((8.0, 0.0), 2.0), ((0.0, 1.5), 0.5)],
+    ("fit", "scale"), [((8.0, 8.0), 2.0), ((8.0, 3.0), 1.0), ((8.0, 0.0), 2.0), ((0.0, 1.5), 0.5)]
 )
 def test_fit_takes_the_side_that_binds(fit: tuple[float, float], scale: float) -> None:
     made = drawing_of([rectangle(1, 1, 5, 4), rectangle(-9, -9, 9, 9)], ["CUT", "FRAME"])

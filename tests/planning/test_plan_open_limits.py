@@ -30,10 +30,7 @@ def test_without_limits_every_feed_and_every_size_is_taken() -> None:
 
 @pytest.mark.parametrize(
     ("setting", "highest"),
-    [
-        ("limits.max_feed_mm_min=250.5", "250"),
-        ("limits.max_feed_mm_min=500", "500"),
-    ],
+    [("limits.max_feed_mm_min=250.5", "250"), ("limits.max_feed_mm_min=500", "500")],
 )
 def test_the_limit_that_is_said_holds_and_the_mend_can_be_said(setting: str, highest: str) -> None:
     machine = path_machine(setting)

@@ -245,10 +245,7 @@ def test_on_the_line_nothing_is_a_gouge() -> None:
 def test_a_hole_as_wide_as_the_tool_is_cut_along_its_middle(width: float) -> None:
     slot = Polyline(np.array([[0.0, 0, 0], [3, 0, 1], [3, width, 0], [0, width, 1.0]]), True)
     outer = _box(-3, -3, 6, 3)
-    for job in (
-        job_of(tool_diameter_mm=0.5),
-        job_of(tool_diameter_mm=0.5, side="inside"),
-    ):
+    for job in (job_of(tool_diameter_mm=0.5), job_of(tool_diameter_mm=0.5, side="inside")):
         found = contours(drawing_of([slot, outer]), job)
         (at,) = [place for place, k in enumerate(found.source.tolist()) if k == 0]
         assert found.lines[at].vertices[:, 1] == pytest.approx(0.5 * width, abs=6e-4)

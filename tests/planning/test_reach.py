@@ -29,9 +29,7 @@ from tests.oracles.contours import (
     comb,
     star,
 )
-from tests.oracles.contours import (
-    opened as open_path,
-)
+from tests.oracles.contours import opened as open_path
 from tests.paths import mirrored, scaled
 from tests.planning.pocket_cases import LETTER_B, region_of, shapes
 from tests.strategies import examples

@@ -242,10 +242,7 @@ LENGTHS = st.floats(0.0, 48.0)
 
 
 @example([(0.0, -2.0), (5e-324, -0.5)], False)  # failed once: its slope is infinite
-@given(
-    st.lists(st.tuples(LENGTHS, st.floats(-2.0, 0.0)), min_size=2, max_size=6),
-    st.booleans(),
-)
+@given(st.lists(st.tuples(LENGTHS, st.floats(-2.0, 0.0)), min_size=2, max_size=6), st.booleans())
 def test_a_raised_profile_is_the_higher_of_profile_and_tabs(
     knots: list[tuple[float, float]], ramped: bool
 ) -> None:

@@ -11,12 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Floats, Ints
 from camtool.geometry.polylines import Polyline, Segments
-from camtool.planning.thin_chips import (
-    feed_levels,
-    level_of,
-    thin_chip_feeds,
-    without_peaks,
-)
+from camtool.planning.thin_chips import feed_levels, level_of, thin_chip_feeds, without_peaks
 from tests.strategies import examples
 
 

@@ -68,10 +68,7 @@ OPTIONS: dict[str, dict[str, st.SearchStrategy[Any]]] = {
         "arc_most_radius_mm": lengths(-2, 4),
         "arc_difference_mm": lengths(-5, -2),
     },
-    "pic-mmh": {
-        "form": st.sampled_from(["example", "annex"]),
-        "buffer_chars": st.integers(0, 60),
-    },
+    "pic-mmh": {"form": st.sampled_from(["example", "annex"]), "buffer_chars": st.integers(0, 60)},
 }
 
 

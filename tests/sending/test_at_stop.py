@@ -47,10 +47,7 @@ def test_a_command_is_run_at_each_stop(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("target", "block", "program"),
-    [
-        ("linuxcnc", "block 7 (M0 G43 H2)", LINUXCNC),
-        ("pic-mmh", "block 5 (M06T02;)", PIC_MMH),
-    ],
+    [("linuxcnc", "block 7 (M0 G43 H2)", LINUXCNC), ("pic-mmh", "block 5 (M06T02;)", PIC_MMH)],
 )
 def test_a_tool_change_between_cuts_is_a_stop(
     tmp_path: Path, target: str, block: str, program: bytes

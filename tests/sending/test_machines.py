@@ -54,12 +54,7 @@ def sent(
 
 
 def check(
-    name: str,
-    folder: Path,
-    *,
-    settings: list[str],
-    choices: list[str],
-    speed: float,
+    name: str, folder: Path, *, settings: list[str], choices: list[str], speed: float
 ) -> Twin:
     """Post, send, compare; the machine as it is then."""
     program = logo(name, *settings)

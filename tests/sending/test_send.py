@@ -506,10 +506,7 @@ def test_nothing_is_written_over_a_question(program: Path) -> None:
     ("target", "said"),
     [
         ("valcnc", "goes on from part zero; bring the tool there, and give --tool-at zero"),
-        (
-            "i8751",
-            "goes on from there; give --tool-at journal if it has stayed there",
-        ),
+        ("i8751", "goes on from there; give --tool-at journal if it has stayed there"),
     ],
 )
 def test_a_machine_that_says_no_place_is_not_gone_on_with_unasked(

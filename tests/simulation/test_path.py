@@ -17,14 +17,7 @@ from camtool.toolpath import moves
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from tests.oracles.motion_rows import rows_of
-from tests.oracles.path_machine import (
-    STEP,
-    Slide,
-    both,
-    dense_path,
-    length_of,
-    path_machine,
-)
+from tests.oracles.path_machine import STEP, Slide, both, dense_path, length_of, path_machine
 from tests.strategies import examples
 from tests.targets import model_of, simulate
 

@@ -20,10 +20,7 @@ CUTTERS = (
 
 
 def moves_of(
-    start: npt.ArrayLike,
-    end: npt.ArrayLike,
-    tool: npt.ArrayLike,
-    *cutters: CutterProfile,
+    start: npt.ArrayLike, end: npt.ArrayLike, tool: npt.ArrayLike, *cutters: CutterProfile
 ) -> StockMoves:
     """Moves of one tool, or of a tool for each; with one cutter all are of it."""
     begin, finish = np.array(start, dtype=np.float64), np.array(end, dtype=np.float64)

@@ -20,11 +20,7 @@ from camtool.pipeline import Judging, post_by_tool, post_drawing, verify_program
 from camtool.planning.job import Job, KeepOutBox, Operation, Stock, Tabs, Tool
 from camtool.planning.plan import Plan, planned
 from camtool.records import replace
-from camtool.stock.checks import (
-    StockRequest,
-    stock_findings,
-    stock_request,
-)
+from camtool.stock.checks import StockRequest, stock_findings, stock_request
 from camtool.stock.cut import cut_stock
 from camtool.stock.cutters import cutter_profile
 from camtool.stock.findings import StockCode

@@ -16,14 +16,7 @@ from camtool.planning.link import tool_note
 from camtool.records import replace
 from camtool.stock.cut import cut_box
 from camtool.stock.cutters import CutterProfile, cutter_profile
-from camtool.stock.heightmap import (
-    MAX_CELLS,
-    NO_MOVE,
-    HeightMap,
-    add_moves,
-    cell_for,
-    height_map,
-)
+from camtool.stock.heightmap import MAX_CELLS, NO_MOVE, HeightMap, add_moves, cell_for, height_map
 from camtool.stock.heights import stock_tree
 from camtool.stock.moves import SAGITTA_MM, StockMoves, stock_moves_of_toolpath
 from camtool.stock.slides import tools_of_rows

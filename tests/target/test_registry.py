@@ -41,9 +41,7 @@ def test_an_unknown_target_is_told_the_nearest(name: str) -> None:
         load_target(name)
 
 
-def test_a_broken_plug_in_is_named_and_harms_nothing_else(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_broken_plug_in_is_named_and_harms_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     broken = EntryPoint("broken", "no_such_module:POST")
     good = EntryPoint("pic-mmh", "camtool_postprocessors.pic_mmh:POST")
     monkeypatch.setattr(registry, "entry_points", lambda group: (broken, good))

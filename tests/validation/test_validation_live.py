@@ -54,9 +54,7 @@ PATH_UM = 10.0
 TIME_PART = 0.005
 MOST_MISSES = 2
 
-CAUSES = {
-    "3dtest": "arcs in XZ and YZ are chords in a toolpath; each chord is a move of its own",
-}
+CAUSES = {"3dtest": "arcs in XZ and YZ are chords in a toolpath; each chord is a move of its own"}
 """Why programs are off by more than is aimed at."""
 
 CHORDS = "arcs in XZ and YZ are chords in a toolpath"

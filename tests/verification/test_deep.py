@@ -26,12 +26,7 @@ SHOPS = {
     "flashcut": (1.0, 0.06, 8.0, []),
     "pic-mmh": (1.0, 0.02, 0.8, []),
     "valcnc": (20.0, 2.0, 14400.0, []),
-    "i8751": (
-        10.0,
-        1.0,
-        50.0,
-        [*I8751, "feed.default_mm_min=50", "dialect.tolerance_mm=0.03"],
-    ),
+    "i8751": (10.0, 1.0, 50.0, [*I8751, "feed.default_mm_min=50", "dialect.tolerance_mm=0.03"]),
 }
 
 

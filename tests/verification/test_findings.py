@@ -17,13 +17,7 @@ from camtool.toolpath.moves import Kind
 from camtool.toolpath.wanted import DrawnEdges
 from camtool.verification.findings import VerificationCode
 from camtool.verification.verify import Case, VerifyOptions, judge
-from tests.oracles.dense_moves import (
-    circle,
-    cut,
-    follow,
-    pic_mmh,
-    square,
-)
+from tests.oracles.dense_moves import circle, cut, follow, pic_mmh, square
 from tests.oracles.judged import MACHINE, STEP, codes, grid, judged, sample_part
 from tests.targets import on
 

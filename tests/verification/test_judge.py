@@ -11,13 +11,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 from camtool.verification.cuts import cut_moves
 from camtool.verification.verify import Case, VerifyOptions, judge
-from tests.oracles.dense_moves import (
-    circle,
-    cut,
-    dense_distance,
-    follow,
-    points_of,
-)
+from tests.oracles.dense_moves import circle, cut, dense_distance, follow, points_of
 from tests.oracles.judged import MACHINE, STEP, UM, grid, judged, sample_part
 from tests.targets import on
 

@@ -7,11 +7,7 @@ from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.verify import Case, VerifyOptions, judge
-from tests.oracles.dense_moves import (
-    chunk,
-    cut,
-    follow,
-)
+from tests.oracles.dense_moves import chunk, cut, follow
 from tests.oracles.judged import MACHINE, STEP, UM, grid, sample_part
 from tests.targets import on
 

@@ -77,10 +77,7 @@ BAD = {
     "crawling": (ToolpathBuilder().line(1.0, 0.0, feed=1e-9), "is too slow for the timers"),
     "far": (ToolpathBuilder().rapid(1.1e6, 0.0), "beyond all"),
     "starts far": (ToolpathBuilder((1.1e6, 0.0, 0.0)).rapid(1.0, 0.0), "beyond all"),
-    "wide": (
-        ToolpathBuilder().arc(1.0, 0.0, centre=(1e7, 1e7), ccw=True, feed=1.0),
-        "beyond all",
-    ),
+    "wide": (ToolpathBuilder().arc(1.0, 0.0, centre=(1e7, 1e7), ccw=True, feed=1.0), "beyond all"),
     "no centre": (
         ToolpathBuilder().arc(1.0, 0.0, centre=(math.nan, 0.0), ccw=True, feed=1.0),
         "without a centre",

@@ -38,8 +38,7 @@ def part(*, tools: bool = False) -> Toolpath:
 def coordinates() -> st.SearchStrategy[float]:
     """mm, on and off any grid."""
     return st.one_of(
-        st.integers(-20_000, 20_000).map(lambda number: number / 1000.0),
-        st.floats(-20.0, 20.0),
+        st.integers(-20_000, 20_000).map(lambda number: number / 1000.0), st.floats(-20.0, 20.0)
     )
 
 

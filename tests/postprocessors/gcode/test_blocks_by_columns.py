@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 from camtool_postprocessors.flashcut.write import _Blocks
 from camtool_postprocessors.gcode.plain import PlainRows
-from camtool_postprocessors.gcode.write import (
-    BlockOrder,
-    Events,
-    LineNumbers,
-    Sent,
-    motion_words,
-)
+from camtool_postprocessors.gcode.write import BlockOrder, Events, LineNumbers, Sent, motion_words
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -81,8 +81,7 @@ def test_random_paths_come_back(name: str, path: Toolpath) -> None:
 
 
 @pytest.mark.parametrize(
-    "option",
-    ["dialect.strip_zeros=true", "dialect.block_numbers=true", "dialect.comments=none"],
+    "option", ["dialect.strip_zeros=true", "dialect.block_numbers=true", "dialect.comments=none"]
 )
 @pytest.mark.parametrize("name", TARGETS)
 @examples(30)

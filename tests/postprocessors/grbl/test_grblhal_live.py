@@ -18,12 +18,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from tests.validation.test_validation_referees import (
-    REFEREES,
-    grblhal_settings,
-    run,
-    samples,
-)
+from tests.validation.test_validation_referees import REFEREES, grblhal_settings, run, samples
 
 SIMULATOR = os.environ.get("GRBLHAL_SIM")
 

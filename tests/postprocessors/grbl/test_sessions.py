@@ -158,10 +158,7 @@ def firmware(tmp_path_factory: pytest.TempPathFactory) -> dict[bool, Play]:
     def on_switches(sent: Sequence[Sent]) -> list[str]:
         return said_by(played(program, homes, sent, folder, (*SWITCHES, PROBE)))
 
-    return {
-        False: lambda sent: said_by(played(program, plain, sent, folder)),
-        True: on_switches,
-    }
+    return {False: lambda sent: said_by(played(program, plain, sent, folder)), True: on_switches}
 
 
 def compared(sent: Sequence[Sent], wanted: Sequence[str], *, switched: bool) -> None:

@@ -105,12 +105,7 @@ def live(folder: Path, hal: str = "") -> Iterator[tuple[int, Hands]]:
         file.write(hal)
     with alone(), (folder / "linuxcnc.log").open("w") as log:
         running = subprocess.Popen(
-            COMMAND,
-            cwd=folder,
-            env=environment,
-            stdout=log,
-            stderr=log,
-            start_new_session=True,
+            COMMAND, cwd=folder, env=environment, stdout=log, stderr=log, start_new_session=True
         )
         try:
             yield port, _switched_on(port)

@@ -9,11 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from camtool_postprocessors.matlab_router import controller
-from camtool_postprocessors.matlab_router.controller import (
-    TEXT_KID,
-    TEXT_KPD,
-    lines_of,
-)
+from camtool_postprocessors.matlab_router.controller import TEXT_KID, TEXT_KPD, lines_of
 from camtool_postprocessors.matlab_router.dialect import MatlabRouterController
 from hypothesis import given
 from hypothesis import strategies as st

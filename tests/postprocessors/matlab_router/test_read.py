@@ -11,13 +11,7 @@ from camtool.errors import ProgramError
 from camtool.findings import Severity
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.postprocessors.matlab_router.parts import (
-    STAR,
-    cut_points,
-    posted,
-    router,
-    strokes,
-)
+from tests.postprocessors.matlab_router.parts import STAR, cut_points, posted, router, strokes
 from tests.waiting import no_chewing
 
 SQUARE = b"""%% job 1 of 1: 2 lines
@@ -89,15 +83,7 @@ def test_between_jobs_the_machine_goes_home() -> None:
 
 def test_the_tool_is_switched_where_its_speed_is_known() -> None:
     kinds = [move.kind.name for move in read(SQUARE, "spindle_rpm=12000")]
-    assert kinds == [
-        *["RAPID"] * 3,
-        "LINE",
-        "SPINDLE_CW",
-        "LINE",
-        "LINE",
-        "SPINDLE_OFF",
-        "END",
-    ]
+    assert kinds == [*["RAPID"] * 3, "LINE", "SPINDLE_CW", "LINE", "LINE", "SPINDLE_OFF", "END"]
 
 
 def test_odd_distances_are_cut_short() -> None:
@@ -170,14 +156,8 @@ def test_other_ways_to_write_it(data: bytes) -> None:
 BAD_TEXT = {
     "empty": (b"", "the program is empty"),
     "only a comment": (b"% xy\n", "the program is empty"),
-    "a decimal point": (
-        SQUARE.replace(b"140   140", b"140.5 140"),
-        "line 3, column 12: a dec",
-    ),
-    "a decimal comma": (
-        SQUARE.replace(b"140   140", b"14,0   140"),
-        "line 4, column 3: a row",
-    ),
+    "a decimal point": (SQUARE.replace(b"140   140", b"140.5 140"), "line 3, column 12: a dec"),
+    "a decimal comma": (SQUARE.replace(b"140   140", b"14,0   140"), "line 4, column 3: a row"),
     "a calculation": (SQUARE.replace(b"140   140", b"140-1 140"), "line 3, column 9: '140-1' is"),
     "a letter": (SQUARE.replace(b"140   140", b"1e3   140"), "line 3, column 10: 'e3"),
     "beyond int16": (SQUARE.replace(b"140   140", b"140 32768"), "line 3, column 13: '32768' is"),
@@ -199,10 +179,7 @@ BAD_TEXT = {
     "a speed of 0": (SQUARE.replace(b"  480     0", b"    0     0"), "0 in velxy never ends"),
     "a negative length": (SQUARE.replace(b"   40 ", b"  -40 "), "line 7, column 3: -40 in lxy"),
     "a byte": (SQUARE.replace(b"job", b"j\xf3b"), "line 1, column 5: the byte 0xf3"),
-    "jobs too early": (
-        b"jobs{1} = {xy};\n" + SQUARE,
-        r"line 1, column 1: jobs\{1\} does",
-    ),
+    "jobs too early": (b"jobs{1} = {xy};\n" + SQUARE, r"line 1, column 1: jobs\{1\} does"),
     "other jobs": (SQUARE + b"jobs{1} = {xy};\n", "line 17, column 11: jobs takes the six names"),
     "an open array": (SQUARE.replace(b"];", b"", 1), r"line 6, column 1: 'lxy = \['"),
     "three rows": (SQUARE.replace(b"];", b"1 2 3\n];", 1), "line 2, .*xy has 3 rows of 3 numbers"),

@@ -10,10 +10,7 @@ from hypothesis import strategies as st
 
 from tests.feeding import at_rest, at_rest_quickly, logo, made, motion, same_motion
 
-JOBS = (
-    b"2\r14\r14\r4\r10\r2\r0\r240\r-480\r48\r0\r",
-    b"1\r30\r2\r8\r0\r480\r0\r",
-)
+JOBS = (b"2\r14\r14\r4\r10\r2\r0\r240\r-480\r48\r0\r", b"1\r30\r2\r8\r0\r480\r0\r")
 
 
 def router(*choices: str, settings: tuple[str, ...] = ()) -> MatlabRouterTwin:

@@ -241,10 +241,7 @@ REFUSED = {
         builder().line(z=-1, feed=99).line(208, 10, feed=99),
         r"machine_zero_mm=\[9,0,9\]",
     ),
-    "too long": (
-        builder().line(z=-1, feed=99).line(230, 10, feed=99),
-        "scale the drawing down",
-    ),
+    "too long": (builder().line(z=-1, feed=99).line(230, 10, feed=99), "scale the drawing down"),
     "far outside": (builder().line(z=-1, feed=99).line(1e300, 10, feed=99), "outside of 0 to 200"),
     "too fast": (builder().line(z=-1, feed=99).line(20, 10, feed=226), "above what its axes"),
     "too slow": (builder().line(z=-1, feed=99).line(20, 10, feed=0.2), "below one count"),

@@ -43,12 +43,7 @@ def findings(path: ToolpathBuilder, *settings: str) -> dict[Code, str]:
         ),
         (
             "annex",
-            [
-                "G00Z+00200;",
-                "G00X+01000Y-02001;",
-                "G01Z-00020F08;",
-                "G01X+00000Y-02001F13;",
-            ],
+            ["G00Z+00200;", "G00X+01000Y-02001;", "G01Z-00020F08;", "G01X+00000Y-02001F13;"],
         ),
     ],
 )

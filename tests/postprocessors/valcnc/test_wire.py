@@ -171,10 +171,7 @@ def jogged(at_mm: Place | None, **values: float) -> tuple[Conversation, Any]:
     return talk, twin
 
 
-@given(
-    st.tuples(*[st.floats(-20.0, 20.0)] * 3),
-    st.tuples(*[st.floats(-9.0, 9.0)] * 3),
-)
+@given(st.tuples(*[st.floats(-20.0, 20.0)] * 3), st.tuples(*[st.floats(-9.0, 9.0)] * 3))
 @examples(25)
 def test_a_jog_moves_by_so_much_from_where_it_stands(at: Place, by: Place) -> None:
     x, y, z = by
