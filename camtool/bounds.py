@@ -24,7 +24,7 @@ _BYTES_AT_ONCE = 1 << 20
 
 
 def file_bytes(path: Path, max_bytes: int) -> bytes | None:
-    """Read a file; None, without reading all of it, if it has more than `max_bytes`. Raises
+    """Read a file; return None if it has more than `max_bytes`, without reading all of it. Raises
     OSError, and ValueError for a name with a null character."""
     with path.open("rb") as stream:
         # The size in the status saves reading a large file; pipes and devices have none.
@@ -35,7 +35,7 @@ def file_bytes(path: Path, max_bytes: int) -> bytes | None:
 
 
 def stream_bytes(stream: BinaryIO, max_bytes: int) -> bytes | None:
-    """Read a stream; None as soon as it has more than `max_bytes`."""
+    """Read a stream; return None as soon as it has more than `max_bytes`."""
     content = BytesIO()
     while piece := stream.read(_BYTES_AT_ONCE):
         content.write(piece)
@@ -45,7 +45,8 @@ def stream_bytes(stream: BinaryIO, max_bytes: int) -> bytes | None:
 
 
 def program_bytes(source: Path | BinaryIO, file: str) -> bytes:
-    """Read a program; ProgramError, which names the file, if it cannot be read or is too large."""
+    """Read the bytes of a program; ProgramError, with the file, if it cannot be read or is too
+    large."""
     try:
         if isinstance(source, Path):
             data = file_bytes(source, MAX_PROGRAM_BYTES)

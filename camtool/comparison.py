@@ -84,8 +84,8 @@ class Comparison(Shown):
         return tuple(contrast_row(name, each.report) for name, each in self.verdicts.items())
 
     def scene(self) -> Overlay:
-        """Return the paths of all variants around the largest error: of the slides, or of the
-        commanded positions where only the interpolator differs."""
+        """Return the picture's content: the paths of all variants around the largest error, those
+        of the slides, or the commanded ones if only the interpolator differs."""
         import numpy as np
 
         from camtool.pictures.overlay import Overlay

@@ -207,8 +207,9 @@ _F = TypeVar("_F", bound=AnyFinding)
 
 
 def summarise_findings(findings: Iterable[_F]) -> list[tuple[_F, int]]:
-    """Return the first MAX_ALIKE findings of each code and severity, in their order; the last of
-    each group with the number of those that are left out, the others with 0."""
+    """Return (finding, number) of the first MAX_ALIKE findings of each code and severity, in their
+    order. The number with the last of each group is that of the findings left out, the others have
+    0."""
     groups: dict[tuple[object, object], list[_F]] = {}
     order = list(findings)
     for each in order:

@@ -817,7 +817,8 @@ def _compensate(wanted_path: Toolpath, machine: Machine) -> CompensatedToolpath:
 
 
 def _without_measures(job: Job) -> Job:
-    """Return the job without its measures against reversals and backlash."""
+    """Return the job without its measures against reversals and backlash (order, approach moves,
+    compensation)."""
     return replace(job, minimise="rapids", approach=False, compensate=False)
 
 

@@ -47,7 +47,7 @@ class Shown(ABC):
 
     @abstractmethod
     def scene(self) -> Scene | Overlay:
-        """Return the content of its picture."""
+        """Return the content of the picture."""
 
     def _repr_svg_(self) -> str:
         from camtool.pictures.picture import Picture
@@ -120,9 +120,9 @@ class Run(Shown):
         return listing
 
     def scene(self, title: str | None = None) -> Scene:
-        """Return the moves of the program (without one, the planned moves) over the drawing,
-        with the slides' path where it was judged. The title is the name of the source by
-        default."""
+        """Return the picture's content: the moves of the program (without one, the planned moves)
+        over the drawing, with the slides' path if it was judged. The default title is the name of
+        the source."""
         from camtool.pictures.scene import scene_of
 
         return scene_of(

@@ -214,7 +214,8 @@ def _work_of(digest: str, work: bytes) -> BatchWork:
 
 @contextmanager
 def _connect(address: str) -> Iterator[Client]:
-    """Connect a client within the block; at its end, unfinished drawings are cancelled."""
+    """Yield a client connected to the scheduler; at the end of the block its unfinished drawings
+    are cancelled."""
     try:
         from distributed import Client
     except ImportError as error:
@@ -275,8 +276,8 @@ def _refusal(worker: str, error: Exception) -> CamtoolError:
 
 
 def _result(future: Future, task: DrawingTask) -> Outputs:
-    """Return the result of a drawing, an error if its workers were lost; CamtoolError for faults
-    that end the run."""
+    """Return the result of a drawing, or an error for it if its workers were lost; CamtoolError
+    for faults that end the whole run."""
     from distributed import KilledWorker
 
     try:

@@ -101,7 +101,7 @@ class Manifest:
             os.close(handle)
 
     def tidy(self, write: Callable[[dict[str, bytes]], None]) -> None:
-        """Rewrite the manifest with one line for each drawing that has files, if it differs."""
+        """Rewrite the manifest, if needed, with one line for each drawing that still has files."""
         present = [stem for stem in sorted(self._entries) if self._is_used(self._entries[stem])]
         if self._tidy and len(present) == len(self._entries):
             return
@@ -127,8 +127,8 @@ def _line(stem: str, entry: ManifestEntry) -> str:
 
 
 def _read(place: Path) -> tuple[dict[str, ManifestEntry], bool]:
-    """Read the entries of all complete lines (none without a manifest), and True if the file is as
-    `tidy` would write it."""
+    """Return the entries of all complete lines (none without a manifest), and True if the file is
+    as `tidy` would write it."""
     try:
         lines = place.read_bytes().splitlines()
     except OSError:

@@ -204,8 +204,8 @@ def _cause(code: int | None) -> str:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Block Ctrl-C within the block. A worker started here inherits that, so that Ctrl-C cannot
-    stop it before it ignores the signal itself."""
+    """Block Ctrl-C (SIGINT) within the block. A worker started there inherits this, so that Ctrl-C
+    cannot stop it before it ignores the signal itself."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -145,8 +145,8 @@ def _sigma(residual: Floats, leverage: Floats, freedom: int, *, has_uncertainty:
 def _identifiable(
     parameters: Sequence[Parameter], matrix: Floats
 ) -> tuple[Bools, tuple[FixedParameter, ...]]:
-    """Return the mask (P,) of the parameters that the readings determine, and the others with
-    the reason."""
+    """Return the mask (P,) of the parameters that the readings determine, and the other parameters
+    with the reason."""
     size = np.linalg.norm(matrix, axis=0)
     is_free = size > 0.0
     touched = is_free.copy()
@@ -175,8 +175,8 @@ def _identifiable(
 
 
 def _fixing_order(parameter: Parameter) -> int:
-    """Return the rank in which a parameter is fixed, the highest first: the scale of a step is
-    mostly known."""
+    """Return the rank of a parameter among those that may be fixed; the highest is fixed first.
+    The scale of a step ranks highest, since it is mostly known."""
     return ("play", "squareness", "scale").index(parameter.what)
 
 
@@ -349,8 +349,8 @@ def _estimates(model: Model, solution: Solution, machine: Machine) -> list[Estim
 
 
 def _mean_backlash(model: Model, solution: Solution, machine: Machine) -> list[Estimate]:
-    """Return the mean backlash of axes measured in regions, if that of all regions is
-    estimated."""
+    """Return the mean backlash of each axis measured in regions, if it is estimated in all of
+    them."""
     depends = model.depends(solution.values)
     estimates = []
     for axis in ("x", "y"):
@@ -462,12 +462,13 @@ def _sigmas(residual: float, sigma: float) -> float | None:
 
 
 def to_text(calibration: Calibration, machine: Machine) -> str:
-    """Format the values, those not estimated, the compensation to set, and the residuals."""
+    """Return a calibration as text: the estimates, the values that were not estimated, the
+    compensation to set, and the residuals."""
     return "\n".join(_text(calibration, machine))
 
 
 def to_data(calibration: Calibration, machine: Machine) -> dict[str, Any]:
-    """Return the same data for JSON; lengths in mm, residuals in µm, squareness in rad."""
+    """Return a calibration as data for JSON; lengths in mm, residuals in µm, squareness in rad."""
     return {
         "target": calibration.target,
         "file": calibration.file,
@@ -530,8 +531,8 @@ def _given_only(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[str, float, int]]:
-    """Return (axis, mm, whole steps) that the controller must add at reversals to take up the
-    measured backlash: B/k, in its own mm."""
+    """Yield (axis, mm, whole steps) for each axis: what the controller must add at reversals to
+    take up the measured backlash, B/k, in its own mm."""
     for axis in ("x", "y", "z"):
         play, step = calibration.estimate("play", axis), calibration.estimate("step", axis)
         if play is not None:
@@ -543,8 +544,9 @@ def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[
 
 
 def scatters(calibration: Calibration) -> list[Scatter]:
-    """Return the scatter of each nominal length with several readings, as table 15 of the thesis
-    on pic-mmh has it (L2528-2630): before any model, so that errors of the machine are in it."""
+    """Return the scatter of each nominal length with several readings, as in table 15 of the
+    thesis on pic-mmh (L2528-2630): of the readings themselves, without a model, so that errors of
+    the machine are included."""
     readings: dict[str, list[float]] = {}
     for each in calibration.fitted:
         readings.setdefault(each.reading.measure.nominal, []).append(each.reading.measured_mm)

@@ -233,8 +233,8 @@ AlongAxis = Callable[[str, Point, float, CouponGrid], Coupon]
 
 
 def _along_both(one: AlongAxis, cell: CouponCell, grid: CouponGrid) -> Made:
-    """Lay out one coupon along X at the bottom of the cell and one along Y at its left side, above
-    it."""
+    """Lay out two copies of a coupon: along X at the bottom of the cell, and along Y at its left
+    side above that."""
     low = cell.low + grid.units(3 * GAP_UNITS + MARGIN_UNITS)
     yield one("x", (cell.left, cell.low), cell.right, grid)
     yield one("y", (low, cell.left), cell.high, grid)
@@ -354,7 +354,7 @@ DECIMALS = 9
 
 
 def dxf(sheet: CouponSheet) -> bytes:
-    """Write the sheet as DXF R2000, each path an LWPOLYLINE."""
+    """Return the sheet as DXF R2000, each path an LWPOLYLINE."""
     from ezdxf._options import options
     from ezdxf.filemanagement import new
     from ezdxf.units import MM
@@ -379,7 +379,7 @@ def dxf(sheet: CouponSheet) -> bytes:
 
 
 def svg(sheet: CouponSheet) -> bytes:
-    """Write the sheet as SVG, Y up by the transform of its only group."""
+    """Return the sheet as SVG; the transform of its only group turns Y up."""
     width, height = (_number(side) for side in sheet.size)
     rows = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -438,7 +438,7 @@ HOW: dict[Kind, tuple[str, ...]] = {
 
 
 def skeleton(sheet: CouponSheet, machine: Machine | None) -> str:
-    """Write TOML text for the measurements of a sheet; 0.0 means not measured."""
+    """Return the TOML text of a file for the measurements of a sheet; 0.0 means not measured."""
     width, height = sheet.size
     lines = [
         f"# Measurements of the {sheet.kind} coupon, {width:g} by {height:g} mm.",

@@ -58,8 +58,8 @@ def _set_map(
     measurements: Measurements,
     machine: Machine,
 ) -> None:
-    """Set the map of backlash by region where all cells were measured; switch off an older map of
-    an axis whose backlash was measured as a whole."""
+    """Set, in place, the map of backlash by region for axes measured in all regions; switch off an
+    older map of an axis whose backlash was measured as a whole."""
     for axis in ("x", "y"):
         cells: Regions | None = getattr(measurements.regions, axis)
         unmapped = calibration.estimate("play", axis)
@@ -82,8 +82,8 @@ def _set_map(
 
 
 def _set_uncertainty(file_table: Table, notes: dict[str, str], calibration: Calibration) -> None:
-    """Set the uncertainties of the measured values; those in an older file for the same values are
-    removed, and the rest of it is kept."""
+    """Set, in place, the uncertainties of the measured values, and remove older ones of the same
+    values; others are kept."""
     measured = [
         f"{axis}.{key}"
         for axis in ("x", "y")
@@ -112,7 +112,7 @@ def _set_uncertainty(file_table: Table, notes: dict[str, str], calibration: Cali
 
 
 def _table(table: Table, path: str) -> Table:
-    """Return the table at this path; a new one if there is none."""
+    """Return the table at this path within `table`; it is added if there is none."""
     for name in path.split("."):
         table = table.get(name, {})
     return table

@@ -382,7 +382,8 @@ def _where(name: str, key: str) -> str:
 
 
 def _unit_meant(times: float) -> str:
-    """Return the correction for a length that is this many times its nominal one."""
+    """Return the advice for a length that is `times` as large as its nominal one, such as a
+    mistaken unit."""
     units = {"µm": 1000.0, "cm": 0.1, "m": 0.001, "inches": 1.0 / 25.4, "thousandths": 39.37}
     for unit, factor in units.items():
         if 1.0 / MAX_RATIO < times / factor < MAX_RATIO:

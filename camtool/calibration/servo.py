@@ -113,7 +113,7 @@ def _columns(names: Sequence[str], file: str, *, needs_drive: bool) -> tuple[int
 def _numbers(
     row: Sequence[str], number: int, columns: Sequence[int | None], file: str
 ) -> tuple[float, ...]:
-    """Return the finite numbers of a row in these columns."""
+    """Return the numbers of a row in these columns; InputError if one is not finite."""
     values = []
     for column in columns:
         if column is None:
@@ -169,7 +169,8 @@ def respond(
 def _pieces(
     motor: MotorModel, drive: float, begin: float, end: float, speed: float
 ) -> Iterator[tuple[float, float, float, float]]:
-    """Yield (begin, end, speed at the begin, speed it tends to) of the pieces of a held drive."""
+    """Yield (begin, end, speed at the begin, speed that it tends to) of the pieces into which the
+    motion under a held drive divides, each a single exponential."""
     while True:
         sense = math.copysign(1.0, speed if speed else drive)
         rests = not speed and abs(drive) <= motor.friction_percent
@@ -382,9 +383,9 @@ class LoopStep(Struct, frozen=True, eq=False):
 def simulate_step(
     motor: MotorModel, loop: SpeedLoop, stored: tuple[float, float], reference: float
 ) -> LoopStep:
-    """Simulate a step to `reference`, counts in a tick, by the law of eq. 4.27: each tick measures
-    the whole counts of the tick before; drives are at most full, never negative, and cut to whole
-    percent where gains are whole."""
+    """Simulate a step to `reference` (counts in a tick) by the law of eq. 4.27. Each tick uses the
+    whole counts of the tick before; drives are limited to 0 and full drive, and cut to whole
+    percent if gains are whole."""
     kid, kpd = (gain * loop.gain_unit for gain in stored)
     ticks = round(SIMULATED_S / loop.tick_s)
     speed, drives = np.zeros(ticks), np.zeros(ticks)

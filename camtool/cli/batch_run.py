@@ -123,10 +123,10 @@ class BatchRun:
     verbosity: Verbosity
 
     def run(self, sources: Sequence[str], flags: BatchFlags, reads: Sequence[str]) -> int:
-        """Find the drawings, make those that are not up to date, report; return the exit code.
-        CamtoolError for errors that belong to no single drawing.
+        """Find the drawings, make those that are not up to date, and report; return the exit code.
 
-        `reads` are files that are read besides drawings and jobs.
+        `reads` are files that are read besides drawings and jobs. CamtoolError for errors that
+        belong to no single drawing.
         """
         try:
             batch_end, number = self._run(sources, flags, reads)

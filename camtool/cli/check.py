@@ -76,7 +76,7 @@ class _Check:
             return error.exit_code
 
     def check_file(self, source: str) -> int:
-        """Show the facts of one drawing; return them, and True if any of them is an error."""
+        """Show the facts of one drawing; return the exit code."""
         check_places([source], [self.report, self.preview])
         read = self.drawing.read(source)
         from camtool.geometry.facts import facts_of

@@ -78,8 +78,8 @@ def checked_run(run: Run, program: str | None) -> CheckedFile:
 
 
 def found_in(run: Run, program: str | None) -> tuple[FoundAt, ...]:
-    """Return the findings of a run at their lines; `program` as for `checked_run`. What is found
-    in the drawing or its plan is in the drawing's file, the rest in the program's."""
+    """Return the findings of a run with the file and line of each: findings about the drawing or
+    its plan at the drawing's file, the others at the program's. `program` as for `checked_run`."""
     of_drawing: set[str] = set()
     if run.drawing is not None:
         planned = () if run.wanted is None else run.wanted.findings
@@ -267,8 +267,8 @@ MAX_ANNOTATIONS: Final = 10
 
 
 def workflow_commands(files: Sequence[CheckedFile]) -> bytes:
-    """Return `::error file=…,line=…::message` for findings, errors first; MAX_ANNOTATIONS of each
-    level, and none for remarks."""
+    """Return one line `::error file=…,line=…::message` (or `::warning`) for each finding, errors
+    first; at most MAX_ANNOTATIONS of each level, and none for remarks."""
     every = dict.fromkeys(each for file in files for each in file.findings)
     findings = [each for each in every if each.severity != "info"]
     findings.sort(key=lambda each: each.severity)  # error before warning; else in their order

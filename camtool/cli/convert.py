@@ -114,7 +114,7 @@ def convert(
 
 
 def _surface(name: str) -> Surface:
-    """Read a file of a surface."""
+    """Read a file with the surface of a blank, as `camtool probe` writes it."""
     from camtool.toolpath.surface import surface_of_text
 
     return surface_of_text(read_bytes(name).decode("utf-8", "replace"), display_name(name))

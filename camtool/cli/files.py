@@ -50,7 +50,8 @@ Content: TypeAlias = bytes | Iterable[bytes]
 
 
 def write_all(files: Mapping[str, Content]) -> None:
-    """Write these files, content by name, all or none; OutputError names the first that fails."""
+    """Write these files (content by name), all or none; OutputError names the first that cannot be
+    written."""
     streams = {name: data for name, data in files.items() if _is_stream(name)}
     staged: list[tuple[Path, Path]] = []
     try:
@@ -66,8 +67,8 @@ def write_all(files: Mapping[str, Content]) -> None:
 
 
 def check_places(reads: Iterable[str | None], writes: Iterable[str | None]) -> None:
-    """Raise OutputError, before any work is done, as `refuse_same` does, and when a place of
-    `writes` cannot be written. None is a file that was not requested."""
+    """Raise OutputError, before any work is done, as `refuse_same` does, and for a place in
+    `writes` that cannot be written. None stands for a file that was not requested."""
     names = [name for name in writes if name is not None]
     refuse_same(reads, names)
     for name in names:
@@ -151,7 +152,8 @@ def _exists(place: Path) -> bool:
 
 
 def file_identity(name: str) -> Hashable:
-    """Return the identity of a file that is read; None for one that no output can replace."""
+    """Return a value that identifies a file that is read, the same for all its names and links;
+    None for one that no output can replace."""
     try:
         status = os.fstat(sys.stdin.fileno()) if name == STDOUT else Path(name).stat()
     except (OSError, ValueError, AttributeError):  # nothing there, or no file of the system's
@@ -160,10 +162,11 @@ def file_identity(name: str) -> Hashable:
 
 
 def _place_identity(name: str) -> Hashable:
-    """Return the identity of a place that is written: its file, or its folder and name.
+    """Return a value that identifies a place that is written: its file, or its folder and name.
 
-    Names that differ only in case, or in how accents are coded, are taken for one: they are one
-    file on other computers, and programs travel."""
+    Names that differ only in case, or in how accents are coded, count as the same: they are one
+    file on other computers, and programs are copied there.
+    """
     try:
         status = os.fstat(sys.stdout.fileno()) if name == STDOUT else Path(name).stat()
     except (io.UnsupportedOperation, AttributeError):  # a stdout that is no file of the system's

@@ -129,7 +129,8 @@ def _is_agreed(conversation: Conversation) -> bool:
 
 
 def axes_of(words: tuple[str, ...]) -> dict[str, float]:
-    """Parse `X1.5 Y-2mm F200` to mm and mm/min by axis; OptionError for other words."""
+    """Parse words such as `X1.5 Y-2mm F200` to mm and mm/min by axis; OptionError for
+    other words."""
     values: dict[str, float] = {}
     for word in words:
         letter, text = word[:1].lower(), word[1:]

@@ -75,7 +75,8 @@ AXES: dict[str, tuple[str, Callable[[str], float], str]] = {
 
 
 def axis_settings(flag: str, text: str) -> list[ControllerSetting]:
-    """Parse `300x180x45`, or one value for X, Y and Z. OptionError for other text."""
+    """Parse values such as `300x180x45` for X, Y and Z, or one value for all three; OptionError
+    for other text."""
     key, parse, _ = AXES[flag]
     values = [parse(part) for part in re.split(r"[x×]", text)]
     if len(values) not in (1, 3) or min(values) < 0.0:
@@ -91,7 +92,7 @@ def axis_settings(flag: str, text: str) -> list[ControllerSetting]:
 
 
 def spindle_setting(text: str) -> ControllerSetting:
-    """Parse `10000`, `hand` or `none`."""
+    """Parse the answer about the spindle: a speed such as `10000`, `hand` or `none`."""
     origin, place = FLAG.format("spindle"), f"--spindle {text}"
     if text in ("hand", "none"):
         return ControllerSetting("spindle.switched", text, origin, place)
@@ -99,8 +100,8 @@ def spindle_setting(text: str) -> ControllerSetting:
 
 
 def proposals(target: str, *, switches: bool) -> list[ControllerSetting]:
-    """Return default settings for milling machines that their target leaves open; `switches`: True
-    if the program switches the spindle."""
+    """Return default settings for what a target leaves open about a milling machine; `switches`:
+    the program switches the spindle."""
     if not find_target(target)[0].starts_spindle:
         return []
     return [

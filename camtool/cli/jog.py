@@ -44,7 +44,7 @@ def jog(
 
 
 def _place_of(text: str | None) -> Place | None:
-    """Parse `X0,Y0,Z5`; OptionError for other text."""
+    """Parse a place such as `X0,Y0,Z5`; None without text, OptionError for other text."""
     if text is None:
         return None
     values = axes_of(tuple(text.replace(",", " ").split()))

@@ -105,7 +105,7 @@ def meet(
 
 
 def _say_end(result: Meeting, source: str, output: str, *, quiet: bool) -> None:
-    """Report the written file, and whether its job holds."""
+    """Report the name of the written file, and whether all dimensions hold with its job."""
     place = "stdout" if output == STDOUT else output
     if result.holds and not result.changed:
         say("every dimension holds as it is: no job was written", quiet=quiet)

@@ -65,7 +65,7 @@ def in_colour(stream: TextIO | None) -> bool:
 
 
 def say_error(error: CamtoolError) -> None:
-    """Show an error on one line; how to fix it is bold on a terminal."""
+    """Show an error on one line; on a terminal the advice is bold."""
     text, mend = one_line(f"camtool: error: {error}"), one_line(" ".join(error.mend.split()))
     if mend and text.endswith(mend) and in_colour(sys.stderr):
         text = text.removesuffix(mend) + click.style(mend, bold=True)
@@ -162,7 +162,7 @@ def report_marks(findings: Iterable[Finding]) -> dict[str, str]:
 
 
 def _line(line: str, name_width: int, marks: Marks, columns: int) -> str:
-    """Format a name and its value, wrapped below itself."""
+    """Return a name and its value, with the value wrapped in its own column."""
     name, value = line[:name_width], line[name_width:]
     mark = marks.get(name.strip())
     colour = None if mark is None else COLOURS[mark]

@@ -142,8 +142,8 @@ def decorate(command: Command, options: Sequence[Option]) -> Command:
 def with_flags(
     command: Command, record: str, make: type[Any], options: Sequence[Option]
 ) -> Command:
-    """Return the command with these options, passed to it as `record`, a struct whose fields
-    have their names."""
+    """Return the command with these options, which are passed to it as one argument `record`: a
+    struct whose fields have the names of the options."""
     names = make.__struct_fields__
     return decorate(gather(record, make, names)(command), options)
 

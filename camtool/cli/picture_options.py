@@ -57,7 +57,7 @@ class Canvas(Struct, frozen=True):
     layered: bool = True
 
     def has(self, layer: Layer) -> bool:
-        """Return True if its pictures can have the layer."""
+        """Return True if the pictures of the command can have this layer."""
         if layer.needs == "path":
             return self.predicted
         return layer.needs == "drawing" or self.moves
@@ -301,8 +301,8 @@ class Painter(Struct, frozen=True, dict=True):
             yield caption, render(self.scenes[-1], CLOSEUP, options)
 
     def stock(self, swept_mm: tuple[float, float, float, float] | None = None) -> bytes | None:
-        """Draw the SVG of the stock on the machine, with the box that tools and holders pass over;
-        None without a drawing."""
+        """Return the SVG of the stock on the machine, with the box that tools and holders pass
+        over; None without a drawing."""
         from camtool.pictures.draw import render
         from camtool.pictures.picture import on_stock
 

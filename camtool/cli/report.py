@@ -87,7 +87,7 @@ class ReportOutputs(Struct, frozen=True):
         return [each for each in names if each is not None]
 
     def check(self, reads: Iterable[str | None], *other_names: str) -> None:
-        """Raise OutputError, before any work is done, when a place of these or of `other_names`
+        """Raise OutputError, before any work is done, if one of these places or of `other_names`
         cannot be written, is one of `reads`, or holds a picture that the page did not write."""
         names = [*other_names, self.preview, self.report, self.page, self.beside]
         names += [*self.checks.names, *self.plots.names]

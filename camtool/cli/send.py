@@ -354,7 +354,7 @@ class _Sending:
         return str(copy)
 
     def _watch(self, conversation: Conversation) -> None:
-        """Show the state of the conversation when it has changed."""
+        """Show the state of the conversation each time it has changed."""
         block = (
             self.one.block_of(self.one.packets[conversation.acknowledged - 1].block)
             if (conversation.acknowledged)

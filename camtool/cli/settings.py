@@ -124,7 +124,7 @@ def asked_settings(target: LoadedTarget, port: str, baud: int | None, *, quiet: 
 def _restore(
     target: LoadedTarget, file: str, port: str, baud: int | None, *, yes: bool, quiet: bool
 ) -> int:
-    """Write the settings of a file that differ from those of the controller; return the exit
+    """Write to the controller the settings of a file that differ from its own; return the exit
     code."""
     new_values = _settings_of(file)
     now = dict(map(_name_value, asked_settings(target, port, baud, quiet=quiet)))

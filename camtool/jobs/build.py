@@ -106,8 +106,8 @@ class JobTables(Struct, frozen=True):
 
 
 def read_job_file(path: Path, data: bytes | None = None) -> JobTables:
-    """Return the tables of a job file; OptionError names file, table and key, and says how to
-    fix it. `data`: what is in it, where it has been read already."""
+    """Return the tables of a job file; OptionError names file, table and key, and says how to fix
+    it. `data`: the content of the file, if it has been read already."""
     try:
         values = read_table(path, data)
     except MachineError as error:

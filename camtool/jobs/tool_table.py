@@ -39,7 +39,8 @@ class TableTool(Struct, frozen=True):
 def read_tool_table(text: str, file: str) -> dict[int, TableTool]:
     """Return the tools of a table by number, in the order of its lines.
 
-    OptionError names file and line for what is no word, comes twice, is missing or out of range.
+    OptionError, with file and line, for words that are malformed, repeated, missing or out of
+    range.
     """
     tools: dict[int, TableTool] = {}
     for row, line in enumerate(text.split("\n"), start=1):

@@ -48,7 +48,7 @@ class Course:
         self._spindle_rows = np.flatnonzero(starts)
 
     def left_s(self, acknowledged: int) -> float:
-        """Return the time, s, that remains when so many packets are acknowledged."""
+        """Return the remaining time, s, when this number of packets is acknowledged."""
         return self._left_s[acknowledged]
 
     def acknowledged_block(self, talk: Conversation) -> int:
@@ -123,7 +123,8 @@ class LoadedProgram(Struct, frozen=True, eq=False):
         return viewer_page(replace(scene, cut=cut, tool_mm=self.tool_mm))
 
     def facts(self) -> dict[str, Any]:
-        """Return the values of the program that the page shows, and its findings."""
+        """Return the facts about the program that the page shows, and its findings, as data for
+        JSON."""
         one = self.one
         return {
             "name": Path(self.file).name,

@@ -185,7 +185,7 @@ class Session:
             self._thread.join(wait_s)
 
     def reopen(self) -> None:
-        """Open the line again after it was lost, or the machine was not found."""
+        """Open the line again after it was lost, or if the machine was not found."""
         self._opens.set()
 
     def stop(self) -> None:

@@ -503,7 +503,8 @@ class MonotoneSegment(Struct, frozen=True):
 
 
 def monotone_segments(move: Move, sweep_rad: float) -> Iterator[MonotoneSegment]:
-    """Yield a line as one segment; an arc of this signed sweep cut where X or Y reverses."""
+    """Yield the parts of a move in which no axis reverses: a line as a whole, an arc of this
+    signed sweep divided where X or Y reverses."""
     if move.kind not in (Kind.ARC_CW, Kind.ARC_CCW) or move.centre is None:
         yield MonotoneSegment(move.start, move.end)
         return

@@ -1009,7 +1009,7 @@ class Stock(FrozenRecord):
         return x, y, x + width, y + height
 
     def turned(self, turn: Turn) -> Stock:
-        """Return the stock as it lies in a set-up."""
+        """Return the stock as it lies in a set-up, turned over as this says."""
         box = self.box_mm
         return self if box is None else replace(self, corner_mm=turn.box(box)[:2])
 

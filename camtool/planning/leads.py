@@ -221,8 +221,8 @@ def signed_distances(path: Polyline, points: Floats) -> Floats:
     """Return the distances (J,) of points (J, 2) from a path, positive to its left, negative to
     its right.
 
-    Left of a closed path is its inside when it runs CCW. Beside an open path the nearest place
-    of it decides: on a line or arc the side of that, at a vertex the side of the bisector of the
+    The left of a closed path is its inside if it runs CCW. Beside an open path the nearest place
+    decides: on a line or arc its side there, at a vertex the side of the bisector of the
     directions there; beyond its ends, the tangents go on.
     """
     segments = Segments.of(path)

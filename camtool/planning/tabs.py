@@ -211,7 +211,7 @@ def is_hole(contour: Contour) -> bool:
 
 
 def _is_long_enough(contour: Contour) -> bool:
-    """Return True if a contour is at least as long as its tabs."""
+    """Return True if a contour is at least as long as its tabs together."""
     operation = contour.setting.operation
     total = float(path_lengths(Polylines.of([contour.path]))[0])
     model, foot = _model(operation, contour.setting.levels_mm[-1])

@@ -72,8 +72,8 @@ class OpenPort:
         self._serial.write(data)
 
     def reopen(self, wait_s: float) -> None:
-        """Close the port for `REOPEN_S`, so that the other end notices, and open it again, with at
-        most `wait_s` of waiting for it."""
+        """Close the port for `REOPEN_S`, so that the other end notices, and open it again; wait at
+        most `wait_s` for it to exist."""
         self.close()
         end = time.monotonic() + wait_s
         while True:
@@ -189,8 +189,8 @@ def manner_of(target: LoadedTarget, **choices: Any) -> Manner:
 
 
 def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Port:
-    """Return the port of that name with the given rate, or else that of the wire or of the machine
-    file; OptionError if the port needs a rate and none is known."""
+    """Return the port of this name. Its rate is the given one, else that of the wire or the
+    machine file; OptionError if the port needs a rate and none is known."""
     link = target.machine.link
     rate = baud or wire.baud or (round(link.baud) if link.baud else None)
     port = Port(name, rate, wire.frame)

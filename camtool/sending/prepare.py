@@ -128,8 +128,8 @@ class Consignment(Struct, frozen=True, eq=False):
         return (x, y, z), (x1, y1, z1)
 
     def block_of(self, sent_block: int) -> int:
-        """Return the last block of the program that is done with block `sent_block` (from 0) of
-        what is sent; −1 within the entry."""
+        """Convert a block `sent_block` (from 0) of what is sent to the last block of the program
+        that is done with it; −1 within the entry."""
         return (
             sent_block if self.rest is None or sent_block < 0 else int(self.rest.done[sent_block])
         )
@@ -463,8 +463,8 @@ class _MovePairs:
         self._arms = PolarArcs(wanted_path, wanted_path.is_arc)
 
     def match(self) -> tuple[Ints, int] | None:
-        """Return the last row of `reread` for each wanted move (M,), and its first row after the
-        entry; None if the moves differ."""
+        """Return the last row of `reread` for each wanted move (M,), and the first row of `reread`
+        after the entry; None if the moves differ."""
         rows = np.flatnonzero(self._wanted.is_motion)
         moves = np.flatnonzero(self._again.is_motion)
         tail = moves[max(len(moves) - len(rows), 0) :]

@@ -55,7 +55,7 @@ class LegRun:
         self._row = -1  # the last row in a ledger
 
     def run(self, blocks: Iterable[Legs]) -> Iterator[Chunk]:
-        """Yield the chunks of all legs, with all rows in their ledgers."""
+        """Yield the motion in chunks; every row is in the ledger of at least one chunk."""
         for legs in blocks:
             yield from self._block(legs)
         rows = np.arange(self._row + 1, len(self._standing.waits))
@@ -119,7 +119,7 @@ class LegRun:
         self._position = self._position + legs.steps.sum(axis=0)
 
     def _chunk(self, legs: Legs, share: _Share, commanded: Floats) -> Chunk:
-        """Return the samples of a window, with the ledger of its rows."""
+        """Return the chunk of a window: its samples, and the ledger of its rows."""
         leg_row = legs.row[share.legs]
         turn = np.flatnonzero(np.diff(leg_row, prepend=-1))
         moving = leg_row[turn]

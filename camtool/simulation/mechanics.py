@@ -97,9 +97,9 @@ class Mechanics:
         return self.even and self.lean == 0.0
 
     def follow(self, commanded_mm: Floats, offsets: Ints) -> tuple[Floats, Ints]:
-        """Return the positions of the slides (K, 3) mm for the commanded positions (K, 3) mm,
-        which continue those of the last call, and the reversals (R, 3) of the axes in each run
-        offsets[r]:offsets[r+1] of them."""
+        """Return the positions of the slides (K, 3), mm, for commanded positions (K, 3), mm, which
+        continue those of the last call; and the reversals (R, 3) of the axes in each run
+        offsets[r]:offsets[r+1] of these positions."""
         slide = np.empty(commanded_mm.shape)
         reversals = np.zeros((len(offsets) - 1, 3), dtype=np.int64)
         arguments = commanded_mm, offsets, self.axes, self.states

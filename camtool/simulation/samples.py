@@ -57,8 +57,8 @@ class SampleSource(Protocol):
         """Return row (K,) and commanded position (K, 3) mm of the samples low:high."""
 
     def steps(self, bounds: Ints) -> Ints:
-        """Return (R, 3) steps of the axes within samples bounds[r]:bounds[r+1], which are of the
-        last window."""
+        """Return (R, 3) the steps of the axes within the samples bounds[r]:bounds[r+1], which must
+        lie in the window of the last call."""
 
     def moments_s(self, low: int, high: int, rows_s: Floats) -> Floats:
         """Return (K,) s from the start of its row to each of the samples low:high; `rows_s` (R,):
@@ -193,8 +193,8 @@ def _chunks(block: SampledRows, mechanics: Mechanics, chunk_steps: int) -> Itera
 
 
 def sample_spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
-    """Return distance of samples, mm: the finer coded step of X and Y, or what `MAX_SAMPLES`
-    allows."""
+    """Return the distance of samples, mm: the finer coded step of X and Y, or more so that there
+    are at most `MAX_SAMPLES`."""
     return spacing_along(move_lengths(toolpath), machine)
 
 
@@ -258,7 +258,8 @@ class PathSamples:
         return row, self.points(row, share)
 
     def places(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Return row (K,) and share (K,) of its length, in (0, 1], of the samples low:high."""
+        """Return for each of the samples low:high its row (K,) and its position as a share (K,) of
+        the row's length, in (0, 1]."""
         first = int(np.searchsorted(self._offsets, low, side="right")) - 1
         pieces = slice(first, int(np.searchsorted(self._offsets, high)))
         sample_counts = np.diff(np.clip(self._offsets[pieces.start : pieces.stop + 1], low, high))

@@ -72,7 +72,7 @@ def height_map(moves: StockMoves, box: Box, cell_mm: float, *, owners: bool = Fa
 
 
 def add_moves(heights: HeightMap, moves: StockMoves, first: int = 0) -> None:
-    """Cut more moves into a map, in place; their owners are numbered from `first` on."""
+    """Cut more moves into a map, in place; the owners of cells are numbered from `first` on."""
     left_x, bottom = heights.corner_mm
     half = 0.5 * heights.cell_mm
     owner = np.empty((0, 0), dtype=np.int32) if heights.owner is None else heights.owner

@@ -135,13 +135,13 @@ class Target(ABC):
 
     @abstractmethod
     def write(self, toolpath: Toolpath, machine: Machine[Any, Any]) -> Program:
-        """Return the program; PostError, which names the move, for what the machine or its
+        """Return the program for a toolpath; PostError, with the move, for what the machine or its
         dialect cannot do."""
 
     @abstractmethod
     def read(self, data: bytes, machine: Machine[Any, Any]) -> Toolpath:
-        """Return the moves as the controller decodes them; ProgramError, which names block and
-        column."""
+        """Return the moves of a program as the controller decodes them; ProgramError, with block
+        and column."""
 
     def read_in(self, data: bytes, machine: Machine[Any, Any], folder: Path | None) -> Toolpath:
         """Return the moves as `read` does, for a program whose file lies in `folder` (None: it has
@@ -157,11 +157,12 @@ class Target(ABC):
         return machine.target.grade or self.grade
 
     def model(self) -> ControllerModel[Any, Any]:
-        """Return the model of its controllers; needed only where `controllers` names any."""
+        """Return the model of the target's controllers; needed only if `controllers` names any."""
         raise NotImplementedError(f"{self.name} has no model of its controllers")
 
     def speed_loop(self, machine: Machine[Any, Any]) -> SpeedLoop | None:
-        """Return the speed loops of its axes; None for a controller without any."""
+        """Return the speed loops of the machine's servo axes; None for a controller
+        without any."""
         return None
 
     def loop_keys(self, loop: SpeedLoop) -> Mapping[str, Any]:
@@ -209,13 +210,13 @@ class Target(ABC):
         return errors, []
 
     def signals(self) -> SignalModel | NoSignals:
-        """Return the model of the signals of its motors; by default a `NoSignals`, which says why
-        there is none."""
+        """Return the model of the signals of the machine's motors; by default a `NoSignals`, which
+        says why there is none."""
         return NoSignals()
 
     def wire(self) -> Wire | NoWire:
-        """Return the protocol that sends its programs; by default a `NoWire`, which says why there
-        is none."""
+        """Return the protocol that sends programs to the machine; by default a `NoWire`, which
+        says why there is none."""
         from camtool.target.wire import NoWire
 
         return NoWire()
@@ -226,8 +227,7 @@ class Target(ABC):
         return None
 
     def made_elsewhere(self, data: bytes) -> bool:
-        """Return True if the text of the program shows that another program than camtool wrote
-        it."""
+        """Return True if the program's text shows that it was not written by camtool."""
         return False
 
     def line_bytes(self, data: bytes, machine: Machine[Any, Any]) -> int:
@@ -253,6 +253,6 @@ class Target(ABC):
         return None
 
     def twin_kind(self) -> TwinKind:
-        """Return the virtual controllers of the target; MachineError, which says why, for one that
-        has none."""
+        """Return the virtual controllers of the target; MachineError, with the reason, if it has
+        none."""
         raise MachineError(f"{self.name} has no virtual controller: {self.no_twin}")

@@ -71,9 +71,9 @@ class SignalModel(ABC):
 
     @abstractmethod
     def pulses(self, toolpath: Toolpath, machine: Machine[Any, Any]) -> Iterator[Pulses]:
-        """Yield the pulses of all motors up to the end of the program. Without those that are
-        `is_added`, each axis makes the steps of the ledgers of the controller's model. Raises as
-        `ControllerModel.run`."""
+        """Yield the pulses of all motors up to the end of the program. Not counting those that are
+        `is_added`, each axis makes the same steps as in the ledgers of the controller's model.
+        Raises as `ControllerModel.run`."""
 
 
 class NoSignals(Struct, frozen=True):

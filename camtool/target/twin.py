@@ -154,7 +154,7 @@ class Slides:
         return np.rint(travel).astype(np.int64), self._added[low:high]
 
     def stop(self, now: float) -> None:
-        """Stop where the slides are now; the rest of the travel is never done."""
+        """Stop where the slides are now; the rest of the travel is dropped."""
         self.advance(now)
         if self.ends_s is not None:
             self._mechanics.states[:] = self._before
@@ -215,11 +215,12 @@ class Twin(ABC):
         self._out = bytearray()
 
     def connect(self, now: float) -> bytes:
-        """Open the line; return what the controller sends at that."""
+        """Open the line; return what the controller sends then."""
         return self.advance(now)
 
     def receive(self, data: bytes, now: float) -> bytes:
-        """Receive bytes; return what the controller has sent until then and at once."""
+        """Receive bytes at the time `now`; return what the controller has sent up to then, its
+        immediate answer included."""
         self._run(now)
         for octet in data:
             self._receive_byte(octet)
@@ -227,7 +228,7 @@ class Twin(ABC):
         return self._take_output()
 
     def advance(self, now: float) -> bytes:
-        """Let time pass; return what the controller sends meanwhile."""
+        """Advance the clock to `now`; return what the controller sends meanwhile."""
         self._run(now)
         return self._take_output()
 

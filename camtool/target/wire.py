@@ -75,8 +75,7 @@ class Forecast(Struct, frozen=True, eq=False):
         return x, y, z
 
     def seconds_of(self, block: int) -> float:
-        """Return the time of a block, s; blocks behind the last one that does anything take
-        none."""
+        """Return the time of a block, s; 0 for blocks after the last one that does anything."""
         return float(self.seconds[block]) if block < len(self.seconds) else 0.0
 
 
@@ -275,7 +274,7 @@ class Conversation(ABC):
         return max((packet.block for packet in self.packets[: self.done]), default=-1)
 
     def actions(self) -> list[Action]:
-        """Return the actions to carry out now, in order, and forget them."""
+        """Return the actions to carry out now, in order; each is returned only once."""
         actions, self._out = self._out, []
         return actions
 
@@ -515,20 +514,20 @@ class Hand(Conversation):
 
     @abstractmethod
     def hold(self, values: Mapping[str, float], now: float) -> None:
-        """Move in a direction until `release`: `values` are the senses of the axes (−1, 1), the
-        "feed" (mm/min), and the "room" (mm) after which it ends at the latest, where that is
-        known. MachineError as of `order`."""
+        """Move in a direction until `release`. `values`: the senses of the axes (−1, 1), the
+        "feed" (mm/min), and, if known, the "room" (mm) after which the motion ends at the latest.
+        MachineError as for `order`."""
 
     @abstractmethod
     def release(self, now: float) -> None:
-        """End `hold`: what ends the motion is the next thing to be written."""
+        """End the motion of `hold`: the bytes that stop it are the next to be written."""
 
     @abstractmethod
     def say(self, line: str, now: float) -> None:
-        """Send a typed line; its answers are told. MachineError as of `order`."""
+        """Send a typed line; its answers are shown to the user. MachineError as for `order`."""
 
     def close(self, now: float) -> None:
-        """End the conversation with a machine that stands; otherwise stop it."""
+        """End the conversation if the machine stands; otherwise stop the machine first."""
         if self.state is WireState.READY:
             self._end(WireState.FINISHED)
         else:
@@ -833,8 +832,8 @@ class Wire(ABC):
     def conversation(
         self, packets: Sequence[Packet], machine: Machine[Any, Any], manner: Manner
     ) -> Conversation:
-        """Return the conversation that sends these packets of a program. MachineError where the
-        machine has no command to home and the manner asks for it."""
+        """Return the conversation that sends these packets of a program. MachineError if it must
+        home first (`manner`) and the machine has no command for that."""
 
     def command(
         self,
@@ -843,9 +842,9 @@ class Wire(ABC):
         values: Mapping[str, float],
         manner: Manner,
     ) -> Conversation:
-        """Return the conversation to "home", "zero", "jog" or "unlock" the machine; `values`
-        are those of axes ("x", "y", "z", mm) and the "feed" (mm/min). MachineError where the
-        controller has no such command."""
+        """Return the conversation that homes, zeroes, jogs or unlocks the machine; `values` are
+        those of axes ("x", "y", "z", mm) and the "feed" (mm/min). MachineError if the controller
+        has no such command."""
         raise MachineError(
             f"{machine.target.name} has no command to {action} over its line",
             mend="do it at the machine",

@@ -665,8 +665,8 @@ def _corner_findings(setting_pairs: _SettingPairs) -> Iterator[Finding]:
 
 
 def _corner_tolerances(toolpath: Toolpath) -> Floats:
-    """Return (N,) mm by which the corner at the end of each row may be rounded, or lines merged;
-    NaN where the program leaves that to the machine."""
+    """Return (N,) mm: how far the corner at the end of each row may be rounded, or lines merged;
+    NaN if the program leaves that to the machine."""
     tolerances = [
         max(mode.tolerance_mm or np.inf, mode.merging_mm) if mode.corners == "blend" else 0.0
         for mode in toolpath.modes

@@ -120,10 +120,11 @@ def cover(
     *,
     is_judged: bool = True,
 ) -> Coverage:
-    """Compare decoded with wanted cutting moves, and wanted with decoded ones, on samples about
-    `spacing_mm` apart; `goal` holds the moves of the wanted side. `row_from` (N,) is the wanted
-    row from which each decoded row was written, −1 for none, where that is known. Unless
-    `is_judged`, only the match and the rounding error are computed, and nothing is found.
+    """Compare the cuts of a program (`decoded`) with the wanted ones, and the wanted with the
+    decoded ones, on samples about `spacing_mm` apart; `goal` holds the moves of the wanted side.
+    `row_from` (N,): the wanted row from which each decoded row was written, −1 for none, None if
+    not known. Unless `is_judged`, only the match and the rounding error are computed, and there
+    are no findings.
 
     A contour is compared with the one that it was written from, or that was written from it,
     first, and only where that does not fit with everything
@@ -686,7 +687,8 @@ class NearPairs(Struct, eq=False):
         return self.cuts.row[self.samples.segment]
 
     def rows_along(self) -> Ints:
-        """Return (P, 2) rows of both sides that lie on each other and have the same direction."""
+        """Return (P, 2) pairs of rows of both sides that lie on each other and have the same
+        direction."""
         along = self.cosine > MIN_SAME_COSINE
         other_rows = self.other_moves.cuts.row[self.move[along]]
         return distinct_rows(np.column_stack([self.rows[self.point[along]], other_rows]))

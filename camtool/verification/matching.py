@@ -173,7 +173,7 @@ def _candidates(contours: Indices, nearest_contours: Indices) -> list[Ints]:
 
 
 def empty_match(count: int) -> Match:
-    """Return the match of `count` rows that cut nothing; `match_rows` fills it."""
+    """Return a match of `count` rows that cut nothing, for `match_rows` to fill."""
     return Match(
         row=np.full(count, -1, dtype=np.int32),
         contour=np.full(count, -1, dtype=np.int32),

@@ -115,8 +115,9 @@ class Cutter(Struct, frozen=True):
         return min(SHAPE_TOLERANCE_MM, TOLERANCE_SHARE * 0.5 * self.diameter_mm)
 
     def radius_mm(self, z: Floats) -> Floats:
-        """Return (J,) mm: the radius of the cut at the surface, with the tip at the heights `z`
-        (J,); at the surface itself that of the tip, with which a cut ends there."""
+        """Return (J,) mm: the radius of the cut at the surface with the tip at the heights `z`
+        (J,). With the tip at the surface itself it is the radius of the tip, with which a cut ends
+        there."""
         half_diameter = 0.5 * self.diameter_mm
         if self.nose is None:
             return np.full(len(z), half_diameter)

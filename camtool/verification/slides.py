@@ -169,8 +169,8 @@ class SlidePass:
         return [low, *(row for row in inner if low < row < high), high]
 
     def _close(self, row: int) -> None:
-        """Evaluate the circles that end before a row and empty their bins, and sum up the rows
-        that are complete."""
+        """Evaluate the circles that end before a row and empty their bins; sum up the rows that
+        are complete."""
         while row >= self._task.low + ROWS_AT_ONCE:
             self._sum_up()
             low = self._task.low + ROWS_AT_ONCE

@@ -42,8 +42,8 @@ class TimeSpan(Struct, frozen=True):
     span_s: float | None = None
 
     def within(self, seconds: float) -> tuple[float, float]:
-        """Return its start and its end in a program that takes `seconds`; OptionError for a
-        stretch outside of it."""
+        """Return begin and end, s, of the stretch in a program that takes `seconds`; OptionError
+        if it lies outside the program."""
         if not seconds > 0.0:
             raise OptionError("the program takes no time, so there is nothing to plot")
         if not 0.0 <= self.from_s < seconds:
@@ -217,7 +217,7 @@ def ribbon_of(decoded: Toolpath, seconds: Floats, columns: TimeColumns) -> tuple
 
 
 def _programmed(decoded: Toolpath, seconds: Floats, columns: TimeColumns) -> Trend:
-    """Return the programmed feed of feed moves."""
+    """Return the curve of the programmed feed, in feed moves only."""
     row = _row_columns(seconds, decoded.is_feed, columns, decoded.feed)
     return Trend("programmed", PLUNGE, row.low[0], row.high[0], is_wanted=True)
 

@@ -97,8 +97,8 @@ class ServoRun:
         return UM_PER_MM * np.array([axis.coded_step_mm for axis in self.target.machine.axes])
 
     def ticks(self) -> Iterator[tuple[ServoTicks, Floats]]:
-        """Yield the ticks up to the end of the stretch, and the error (K,) mm along the path at
-        each, NaN where nothing is cut."""
+        """Yield the ticks of the speed loops up to the end of the stretch, and the error (K,), mm,
+        along the path at each; NaN where nothing is cut."""
         errors = np.zeros(0)
         judged = errors_over_time(Case(self.toolpath, self.target))
         for ticks in self.target.target.servo_ticks(self.toolpath, self.target.machine):
@@ -110,7 +110,7 @@ class ServoRun:
                 return
 
     def moves(self) -> Iterator[AxisMove]:
-        """Yield the figures of all orders that begin in the stretch, axis by axis."""
+        """Yield the figures of each axis for all orders that begin in the stretch."""
         from_s, to_s = self.shown_s
         parts: list[ServoTicks] = []
         for ticks, _ in self.ticks():

@@ -43,8 +43,9 @@ width."""
 def engrave(chosen: Chosen, setting: Setting) -> Work:
     """Return a contour for each path, as it is drawn.
 
-    Climb and conventional are sides of a wall, and a groove has two of them: OptionError for a
-    direction other than "drawn"."""
+    OptionError for a direction other than "drawn": climb and conventional refer to a wall, and a
+    groove has two.
+    """
     operation = setting.operation
     if operation.direction != "drawn":
         raise OptionError(

@@ -129,8 +129,8 @@ def turn(chosen: Chosen, setting: Setting) -> Work:
 
 
 def _section(path: Polyline, name: str, operation: Operation) -> Floats:
-    """Return the section (n, 3) from the part's end to the chuck; OptionError where it cannot be
-    turned."""
+    """Return the section (n, 3) of the part to be turned, from the part's end to the chuck;
+    OptionError if it cannot be turned."""
 
     def refuse(message: str, place: Floats, mend: str) -> OptionError:
         where = f"{operation_name(operation)}, {at_place(name, place.tolist())}"
