@@ -83,7 +83,7 @@ class LineDisplay:
         """Show the line of a drawing, and the lines of its findings."""
         self._done += 1
         for line in outcome_lines(outcome, self._verbosity):
-            say(line, quiet=False)
+            say(line)
         if outcome.state is not OutcomeState.UP_TO_DATE or self._verbosity.verbose:
             place = f"{self._done:>{len(str(self._total))}}/{self._total}"
             say(f"{place} {_line(outcome)}", quiet=self._verbosity.quiet)
@@ -238,9 +238,9 @@ def _lines(failed: Sequence[Outcome]) -> None:
         return
     listed = failed[:LISTED]
     width = max(len(one_line(each.source)) for each in listed)
-    say(f"{'failed':<{width}} | why", quiet=False)
+    say(f"{'failed':<{width}} | why")
     for each in listed:
-        say(f"{one_line(each.source):<{width}} | {_reason(each)}", quiet=False)
+        say(f"{one_line(each.source):<{width}} | {_reason(each)}")
     _say_more(len(failed))
 
 
@@ -283,7 +283,7 @@ def _common_folder(outcomes: Sequence[Outcome]) -> str:
 
 def _say_more(rows: int) -> None:
     if rows > LISTED:
-        say(f"… and {rows - LISTED} more; --json FILE names all", quiet=False)
+        say(f"… and {rows - LISTED} more; --json FILE names all")
 
 
 def _reason(outcome: Outcome) -> str:

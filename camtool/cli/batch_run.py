@@ -134,7 +134,7 @@ class BatchRun:
             batch_end, number = EndedBatch((), None), int(signal.SIGINT)
         if number is not None:
             text = "interrupted; written files are complete, and the same command continues"
-            say(f"camtool: {text}", quiet=False)
+            say(f"camtool: {text}")
             return EXIT_SIGNAL + number
         if batch_end.error is not None:
             raise batch_end.error
@@ -263,7 +263,7 @@ class BatchRun:
         try:
             manifest.tidy(write_all)
         except OutputError as error:  # the lines written so far are there
-            say(f"camtool: warning: {error}", quiet=False)
+            say(f"camtool: warning: {error}")
         say_summary(outcomes, seconds, quiet=self.verbosity.quiet)
         target = self.work.target
         files: dict[str, bytes] = {}

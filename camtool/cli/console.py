@@ -261,5 +261,5 @@ class _Talk:
 def _unanswered(request: str, reason: str) -> int:
     """Report that a line has no answer; return the exit code."""
     subject = f"no answer to {request!r}" if request else "the controller does not answer"
-    say(f"camtool: error: {subject}: {reason}; what follows was not sent", quiet=False)
+    say(f"camtool: error: {subject}: {reason}; what follows was not sent")
     return 1

@@ -44,7 +44,7 @@ class ComparedSide:
             run = self._run(target, job)
             say_findings(run.findings, quiet=quiet, verbose=verbose)
             if run.failed or run.decoded is None:
-                say(f"camtool: error: {self.name}: its errors above come first", quiet=False)
+                say(f"camtool: error: {self.name}: its errors above come first")
                 return None
             return cut_stock(run.decoded, target, job)
 

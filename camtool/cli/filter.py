@@ -58,4 +58,4 @@ def filter(source: str, posting: Posting, quiet: bool, verbose: bool) -> int:
 
 def _progress(percent: int) -> None:
     """Print a line that moves LinuxCNC's progress bar to this percentage."""
-    say(f"FILTER_PROGRESS={percent}", quiet=False)
+    say(f"FILTER_PROGRESS={percent}")

@@ -79,7 +79,7 @@ def act(
         stands = f"; it stands at {place_words(place).replace(' ', ',')} (--at)" if place else ""
         say(f"camtool: {action}: done{stands}", quiet=quiet)
         return 0
-    say(f"camtool: error: {action}: {reason}", quiet=False)
+    say(f"camtool: error: {action}: {reason}")
     return 1
 
 
@@ -124,7 +124,7 @@ def _is_agreed(conversation: Conversation) -> bool:
         raise click.UsageError(f"{question}: when that is so, give --yes")
     if click.confirm(f"{question[0].upper()}{question[1:]}?", err=True, default=False):
         return True
-    say("camtool: nothing was sent", quiet=False)
+    say("camtool: nothing was sent")
     return False
 
 

@@ -254,7 +254,7 @@ class Questions:
             try:
                 axis_settings(flag, answer)
             except OptionError as error:
-                say(f"camtool: {error}", quiet=False)
+                say(f"camtool: {error}")
                 continue
             return answer
 

@@ -65,12 +65,12 @@ def _check(program: str, target: LoadedTarget, *, quiet: bool, verbose: bool) ->
     try:
         data = read_bytes(program)
     except CamtoolError as error:
-        say(f"camtool: error: {error}", quiet=False)
+        say(f"camtool: error: {error}")
         return refused_file(error, name, unread=True)
     try:
         run = lint_program(data, target, source=name)
     except CamtoolError as error:
-        say(f"camtool: error: {error}", quiet=False)
+        say(f"camtool: error: {error}")
         return refused_file(error, name)
     say_findings(run.findings, quiet=quiet, verbose=verbose, file=name)
     return checked_run(run, name)

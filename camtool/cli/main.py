@@ -189,10 +189,10 @@ def _exit_code(*, debug: bool) -> int:
         text = io.StringIO()
         error.show(text)
         for line in text.getvalue().splitlines():
-            say(line, quiet=False)
+            say(line)
         return EXIT_BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
-        say("camtool: interrupted; written files are complete", quiet=False)
+        say("camtool: interrupted; written files are complete")
         return EXIT_INTERRUPTED
     except CamtoolError as error:
         _trace(debug)
@@ -204,8 +204,7 @@ def _exit_code(*, debug: bool) -> int:
         _trace(debug)
         say(
             f"camtool: fault in camtool itself ({type(error).__name__}: {error}); "
-            "please report it with the output of the same command with --debug",
-            quiet=False,
+            "please report it with the output of the same command with --debug"
         )
         return EXIT_FAULT
 
@@ -231,7 +230,7 @@ def _trace(debug: bool) -> None:
         import traceback
 
         for line in traceback.format_exc().splitlines():
-            say(line, quiet=False)
+            say(line)
 
 
 def _keep_streams() -> None:

@@ -116,6 +116,5 @@ def _say_end(result: Meeting, source: str, output: str, *, quiet: bool) -> None:
         suffix = f"; {place} is better, and not enough" if result.changed else ""
         say(
             f"camtool: error: {source}: no job was found with which every dimension holds:"
-            f" {count} would not{suffix}",
-            quiet=False,
+            f" {count} would not{suffix}"
         )

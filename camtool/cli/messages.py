@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
 
 
-def say(text: str, *, quiet: bool) -> None:
-    """Show one message on one line, unless quiet; invisible characters are escaped."""
+def say(text: str, *, quiet: bool = False) -> None:
+    """Show one message on one line, unless `quiet`; invisible characters are escaped."""
     if not quiet:
         _echo(tint(one_line(text)))
 
@@ -98,10 +98,10 @@ def say_findings(
     for finding, alike_count in (
         [(each, 0) for each in shown] if verbose else summarise_findings(shown)
     ):
-        say(f"{head}{finding}", quiet=False)
+        say(f"{head}{finding}")
         if alike_count:
             name = f"{finding.severity.name.lower()} {finding.code.name}"
-            say(f"{head}{name}: and {alike_count} more (-v shows all)", quiet=False)
+            say(f"{head}{name}: and {alike_count} more (-v shows all)")
 
 
 # Summaries and tables: names are bold, values that exceed a limit are coloured.

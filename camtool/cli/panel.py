@@ -89,7 +89,7 @@ def panel(
             webbrowser.open(server.address)
         if not quiet:
             where = "a virtual machine" if port is None else line.name
-            say(f"camtool: the panel of {where} is at the address above; Ctrl-C ends", quiet=False)
+            say(f"camtool: the panel of {where} is at the address above; Ctrl-C ends")
         session.start()
 
     async def serve() -> None:

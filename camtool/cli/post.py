@@ -328,10 +328,7 @@ def finish(
         unwritten = {**_page_alone(run, outputs, picture), **outputs.check_files([(run, None)])}
         write_all(unwritten)
         no = "nothing" if outputs.page is None else "no program"
-        say(
-            f"camtool: error: {requested.source}: {no} was written; fix the errors above",
-            quiet=False,
-        )
+        say(f"camtool: error: {requested.source}: {no} was written; fix the errors above")
         return 1
     # For a dialect with several forms (binary, listing) the extension is known only now.
     requested.check(run.program.extension, verified=True)
@@ -390,10 +387,7 @@ def finish_parts(
             files |= _page_alone(run, part.outputs, picture)
         no = "no program" if files else "nothing"
         write_all(files | requested.outputs.check_files((run, None) for run in runs))
-        say(
-            f"camtool: error: {requested.source}: {no} was written; fix the errors above",
-            quiet=False,
-        )
+        say(f"camtool: error: {requested.source}: {no} was written; fix the errors above")
         return 1
     for run, part, name, picture in zip(runs, parts, names, pictures, strict=True):
         assert run.program is not None

@@ -146,7 +146,7 @@ def probe(
         reason = carried(conversation, target, port, baud, quiet=quiet, watch=watch)
         close(reason, {"points": len(heights)})
     if reason:
-        say(f"camtool: error: probe: {reason}; {len(heights)} points were touched", quiet=False)
+        say(f"camtool: error: probe: {reason}; {len(heights)} points were touched")
         return 1
     surface = surface_from(x, y, probed, heights)
     write_all({out: text_of_surface(surface).encode()})
@@ -189,7 +189,7 @@ def asked_to_begin(words: str) -> bool:
     with signs_of_command().hidden():
         if click.confirm(words, err=True, default=False):
             return True
-    say("camtool: nothing was sent", quiet=False)
+    say("camtool: nothing was sent")
     return False
 
 

@@ -123,8 +123,7 @@ def send(
         if state is not None and state.last >= 0 and not quiet:
             say(
                 f"camtool: {place} is of this program, of which {state.block} blocks are done: "
-                "--resume would go on there, and this begins anew",
-                quiet=False,
+                "--resume would go on there, and this begins anew"
             )
         state = None
     elif state is not None:
@@ -147,9 +146,7 @@ def send(
     )
     say_findings(one.run.findings, quiet=quiet, verbose=verbose)
     if one.run.failed:
-        say(
-            f"camtool: error: {one.run.source}: the errors above would spoil the part", quiet=False
-        )
+        say(f"camtool: error: {one.run.source}: the errors above would spoil the part")
         return 1
     if not quiet:
         rows = lines_of(one, target)
@@ -252,7 +249,7 @@ def _confirm() -> bool:
         agreed = click.confirm("Begin?", err=True, default=False)
     if agreed:
         return True
-    say("camtool: nothing was sent", quiet=False)
+    say("camtool: nothing was sent")
     return False
 
 
@@ -334,10 +331,7 @@ class _Sending:
             say(f"camtool: finished: {len(one.packets)} packets", quiet=self.quiet)
             return 0
         trouble = f"{self.answer.trouble}; " if self.answer and self.answer.trouble else ""
-        say(
-            f"camtool: error: {one.run.source}: {trouble}{sent.words}; --resume goes on",
-            quiet=False,
-        )
+        say(f"camtool: error: {one.run.source}: {trouble}{sent.words}; --resume goes on")
         return 1
 
     def _program_file(self) -> str:

@@ -141,7 +141,7 @@ def _restore(
         return 0
     for name, value in changes.items():
         meaning = _meaning(target, f"{name}={value}")
-        say(one_line(f"camtool: {name}: {now[name]} becomes {value}  {meaning}"), quiet=False)
+        say(one_line(f"camtool: {name}: {now[name]} becomes {value}  {meaning}"))
     if not yes and not asked_to_begin(f"Write {len(changes)} settings?"):
         return 1
     lines = [f"{name}={value}" for name, value in changes.items()]
@@ -154,8 +154,7 @@ def _restore(
     rest = [line for line in lines if line not in written]
     say(
         f"camtool: error: settings restore: {reason}; taken: {', '.join(written) or 'none'}; not, "
-        f"or not for certain: {', '.join(rest) or 'none'}",
-        quiet=False,
+        f"or not for certain: {', '.join(rest) or 'none'}"
     )
     return 1
 

@@ -61,7 +61,7 @@ def stale(
     for name, drawings in drawings_by_name.items():
         rows.append(_compare(name, drawings, posting, target, missing=missing))
         if rows[-1].code:
-            say(f"camtool: error: {rows[-1].why}", quiet=False)
+            say(f"camtool: error: {rows[-1].why}")
         elif rows[-1].program is None:
             say(f"camtool: {rows[-1].why}", quiet=not verbose)
     if report is not None:

@@ -245,7 +245,7 @@ def _list(as_json: bool) -> None:
     rows.sort(key=lambda row: list(GRADES).index(row["grade"]))
     machines = list(_own_machines(broken))
     for error in broken:
-        say(f"camtool: warning: {error}", quiet=False)
+        say(f"camtool: warning: {error}")
     if as_json:
         write_all({STDOUT: to_json({"targets": rows, "machines": machines}).encode()})
         return
@@ -331,7 +331,7 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
         "every number's source is in the target's own file:",
         err=True,
     )
-    say(f"{target.file}", quiet=False)
+    say(f"{target.file}")
 
 
 def _backlash_table(name: str, cells: PlayCells, machine: Machine) -> Iterator[str]:

@@ -170,7 +170,7 @@ def touch(
         result = {"what": what, "why": reason, "zero": how.sets_zero and not reason, **measured}
         show_text(json.dumps(result, indent=2, ensure_ascii=False))
     if reason:
-        say(f"camtool: error: touch {what}: {reason}", quiet=False)
+        say(f"camtool: error: touch {what}: {reason}")
         return 1
     labelled = (f"{LABELS[name]}{_text(name, value)}" for name, value in measured.items())
     summary = ", ".join(labelled)

@@ -148,7 +148,7 @@ class _TraceWriter:
         if self._file is not None and len(samples):
             self._file.write(rows(samples))
         for block in self._twin.decoded[self._shown :] if self._verbose else ():
-            say(f"camtool: {self._twin.now:.3f} s: {block.decode('latin-1')}", quiet=False)
+            say(f"camtool: {self._twin.now:.3f} s: {block.decode('latin-1')}")
         self._shown = len(self._twin.decoded)
 
 

@@ -296,7 +296,7 @@ def _judge(
     say_findings(run.findings, quiet=wishes.quiet, verbose=wishes.verbose)
     if not run.failed:
         return 0
-    say(f"camtool: error: {run.source}: the errors above would spoil the part", quiet=False)
+    say(f"camtool: error: {run.source}: the errors above would spoil the part")
     return 1
 
 
