@@ -1,8 +1,7 @@
 """Workers of a Dask cluster: drawings are sent to them, and the client writes the results.
 
 The workers need the same camtool as the client, but no shared disk. A worker with another version
-ends the run, because its programs would differ.
-"""
+ends the run, because its programs would differ."""
 
 from __future__ import annotations
 
@@ -61,8 +60,7 @@ class ClusterPool:
 
         Closing the generator cancels the tasks that are left. Raises OptionError without the
         package `distributed` or a scheduler at the address, and CamtoolError when the scheduler is
-        lost or a worker has another camtool.
-        """
+        lost or a worker has another camtool."""
         with _connect(self._address) as client:
             order = _Order(self._work.digest(), pickle.dumps(self._work))
             workers = _Workers(client, order, self._note)
@@ -162,11 +160,7 @@ class _Workers:
     def _same_camtool(self, workers: list[str]) -> Iterator[str]:
         """Yield the workers with the same camtool; those that have just left are skipped."""
         answers = self._client.run(
-            check_worker,
-            self._order.digest,
-            self._order.work,
-            workers=workers,
-            on_error="return",
+            check_worker, self._order.digest, self._order.work, workers=workers, on_error="return"
         )
         for worker, answer in answers.items():
             if answer is None:

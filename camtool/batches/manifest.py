@@ -3,8 +3,7 @@
 It has a line of JSON for each drawing, appended when the drawing's files are written, so that it
 can be used even after a crash: incomplete lines are skipped, and the last of several lines for one
 drawing counts. A run that ends normally rewrites it, sorted, without the drawings whose files are
-all gone. Drawings that failed stay in it.
-"""
+all gone. Drawings that failed stay in it."""
 
 from __future__ import annotations
 

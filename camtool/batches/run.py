@@ -27,8 +27,7 @@ class DrawingTask:
     """One drawing: its name as the user wrote it, and the common name of its outputs.
 
     `stem` is relative to the output folder, with / between folders and without extension.
-    `order` is further input of the BatchWork (the job of this drawing).
-    """
+    `order` is further input of the BatchWork (the job of this drawing)."""
 
     source: str
     stem: str

@@ -307,12 +307,7 @@ def read_measurements(path: Path) -> Measurements:
         )
     _check_regions(head.regions, coupons, file)
     return Measurements(
-        file,
-        head.target,
-        head.uncertainty_mm,
-        head.compensation_mm,
-        head.regions,
-        tuple(coupons),
+        file, head.target, head.uncertainty_mm, head.compensation_mm, head.regions, tuple(coupons)
     )
 
 

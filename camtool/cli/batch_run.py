@@ -2,8 +2,7 @@
 the outcome of each.
 
 It stands apart from the command, so that `camtool --help`, which loads all commands, loads
-nothing of batches.
-"""
+nothing of batches."""
 
 from __future__ import annotations
 
@@ -126,8 +125,7 @@ class BatchRun:
         """Find the drawings, make those that are not up to date, and report; return the exit code.
 
         `reads` are files that are read besides drawings and jobs. CamtoolError for errors that
-        belong to no single drawing.
-        """
+        belong to no single drawing."""
         try:
             batch_end, number = self._run(sources, flags, reads)
         except KeyboardInterrupt:  # before the first drawing, or for the second time
@@ -299,10 +297,7 @@ def pool_for(batch: BatchRun, note: Callable[[str], None]) -> Pool:
         return ClusterPool(work, running.scheduler, note)
     from camtool.batches.pool import LocalPool, PoolOptions
 
-    options = PoolOptions(
-        jobs=running.jobs or os.cpu_count() or 1,
-        timeout_s=running.timeout,
-    )
+    options = PoolOptions(jobs=running.jobs or os.cpu_count() or 1, timeout_s=running.timeout)
     return LocalPool(work, options)
 
 

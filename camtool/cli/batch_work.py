@@ -164,7 +164,6 @@ def _is_code(path: Path) -> bool:
 def _result_of(task: DrawingTask, run: Run, program: str | None) -> Outputs:
     """Return the outputs of a posted drawing for the summary: its error if it must not be written,
     its figures, and its worst findings. `program`: name of the program's file."""
-
     from camtool.cli.check_formats import found_in
 
     def lines(severity: Severity) -> list[Finding]:

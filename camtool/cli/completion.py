@@ -7,8 +7,7 @@ not know of shells. No answer compiles a kernel or loads a library of drawings.
 The scripts are ours and not click's, for those take names apart at spaces, commas and backslashes,
 and `--target=pi` is nothing to them or is replaced whole. A script hands over its line up to the
 cursor; each answer is a kind (plain, file, dir) and a value. Names come from drawings: whatever
-they hold, a shell must take them as one word and run nothing of them.
-"""
+they hold, a shell must take them as one word and run nothing of them."""
 
 from __future__ import annotations
 
@@ -192,8 +191,7 @@ def completion(shell: str) -> int:
     \b
     bash: eval "$(camtool completion bash)"               in ~/.bashrc
     zsh:  eval "$(camtool completion zsh)"                in ~/.zshrc, after compinit
-    fish: camtool completion fish | source                in ~/.config/fish/config.fish
-    """
+    fish: camtool completion fish | source                in ~/.config/fish/config.fish"""
     click.echo(SHELLS[shell](click.Group(), {}, "camtool", COMPLETE).source(), nl=False)
     return 0
 
@@ -290,8 +288,7 @@ def dxf_layers(file: Path) -> set[str]:
     """Return the layers (group code 8) that the entities of a DXF in text format are on; an empty
     set for other files.
 
-    Names that cannot be shown, or that are of an encoding other than UTF-8, are left out.
-    """
+    Names that cannot be shown, or that are of an encoding other than UTF-8, are left out."""
     if file.suffix.lower() != ".dxf" or not file.is_file():
         return set()
     if file.stat().st_size > MAX_SCANNED_BYTES:

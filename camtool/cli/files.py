@@ -165,8 +165,7 @@ def _place_identity(name: str) -> Hashable:
     """Return a value that identifies a place that is written: its file, or its folder and name.
 
     Names that differ only in case, or in how accents are coded, count as the same: they are one
-    file on other computers, and programs are copied there.
-    """
+    file on other computers, and programs are copied there."""
     try:
         status = os.fstat(sys.stdout.fileno()) if name == STDOUT else Path(name).stat()
     except (io.UnsupportedOperation, AttributeError):  # a stdout that is no file of the system's

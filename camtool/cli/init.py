@@ -173,8 +173,7 @@ def init(
 
     Numbers are one for X, Y and Z, or three. What is not known stands in the file as a comment.
     It is kept in your configuration folder, or with --project in this one, whose camtool.toml
-    then names it. The first machine is the one that commands without --target are for.
-    """
+    then names it. The first machine is the one that commands without --target are for."""
     if settings is not None and port is not None:
         raise click.UsageError("--settings and --port contradict each other")
     if project and output is not None:

@@ -4,8 +4,7 @@
 
 The line stands on stderr, where the next one or a message takes its place, and is gone at the end.
 It is written by a thread of its own from the `Progress` of the command, which stages set as they
-begin. It stands still while a compiled loop runs that gives no other thread a turn.
-"""
+begin. It stands still while a compiled loop runs that gives no other thread a turn."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """The flags that say how a picture looks, and the pictures of a command drawn by them.
 
 A command says with a `Canvas` what its pictures can show. Flags that a picture cannot honour are
-refused by name before any work is done; the user is warned about named layers that are empty.
-"""
+refused by name before any work is done; the user is warned about named layers that are empty."""
 
 from __future__ import annotations
 
@@ -219,11 +218,7 @@ def picture_options(command: Command) -> Command:
                 help=f"Only these layers: {', '.join(layer_names())}.",
             ),
             option(
-                _PICTURE,
-                "--no-layer",
-                multiple=True,
-                metavar="NAME",
-                help="Without this layer.",
+                _PICTURE, "--no-layer", multiple=True, metavar="NAME", help="Without this layer."
             ),
             option(
                 _PICTURE,

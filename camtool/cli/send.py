@@ -106,8 +106,7 @@ def send(
     an answer. Without --port that is all. Ctrl-C stops the machine as its protocol can, and so
     does all else that would end camtool; a second one does not wait until it stands. On a
     terminal: p pauses, r goes on, s does a single block, q stops; + and - change the feed, ] and [
-    the spindle by 10 %, = brings back 100 %. Exit code 1 when the program was not finished.
-    """
+    the spindle by 10 %, = brings back 100 %. Exit code 1 when the program was not finished."""
     from camtool.sending.prepare import consignment, lines_of, tool_at_of
 
     if first is not None and resume:
@@ -202,8 +201,7 @@ def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
     """Read from a journal how far sending this program has come.
 
     Raises InputError for the journal of another program or another machine file, and OptionError
-    if the program was finished.
-    """
+    if the program was finished."""
     state = read_journal(place)
     if state.sha256 != digest(data):
         raise InputError(

@@ -61,8 +61,7 @@ def targets(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -
     camtool targets                             all machines, yours too
     camtool targets grbl                        everything about one
     camtool targets new my-mill --extends grbl  my-mill.toml, to fill in
-    camtool targets new my-mill --from-program part.nc
-    """
+    camtool targets new my-mill --from-program part.nc"""
     if context.invoked_subcommand is None:
         _list(as_json)
 
@@ -111,8 +110,7 @@ def new(
 
     With --from-program, what a program of the controller shows of its dialect of G-code stands in
     it, and what it leaves open is asked; --extends alone asks for the dialect where TARGET is one
-    whose dialect a file describes.
-    """
+    whose dialect a file describes."""
     data = b"" if from_program is None else read_bytes(from_program) or b"\n"
     if extends is None:
         if from_program is None:

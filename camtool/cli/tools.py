@@ -54,8 +54,7 @@ def tools(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> 
     \b
     camtool tools             all of them
     camtool tools mill        one, with its presets by material
-    camtool tools new         a library of yours, where all jobs find it
-    """
+    camtool tools new         a library of yours, where all jobs find it"""
     if context.invoked_subcommand is not None:
         return
     every = _all_tools()
@@ -98,8 +97,7 @@ def show(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> N
 def new(project: bool, output: str | None, quiet: bool, verbose: bool) -> None:
     """Write a library of tools: usual ones, with presets and where their numbers are from.
 
-    It is kept where all jobs find it, or with --project beside camtool.toml in this folder.
-    """
+    It is kept where all jobs find it, or with --project beside camtool.toml in this folder."""
     from importlib import resources
 
     text = resources.files("camtool.jobs").joinpath(TOOLS).read_bytes()

@@ -149,8 +149,7 @@ def verify(
 
     Of a program that others made, without flags that say how it cuts, it is found which contours
     it cuts, on which side and with what tool (or --tool-diameter), and with --align where the
-    drawing lies; then how far it is from them, and what is not cut.
-    """
+    drawing lies; then how far it is from them, and what is not cut."""
     outputs = ReportOutputs(preview, report, page, checks, plots)
     wishes = VerifyOutputs(outputs, picture, second_program, quiet, verbose)
     wishes.check(comparing=compare is not None, gated=gates.given)

@@ -1,8 +1,7 @@
 """Wishes of the user while a machine works: keys, signals, a terminal or a pipe that is lost.
 
 Nothing here may leave a machine alone: every signal that would end camtool, a terminal that is
-closed, and a reader of its output that goes away are wishes to stop. Only kill -9 is not seen.
-"""
+closed, and a reader of its output that goes away are wishes to stop. Only kill -9 is not seen."""
 
 from __future__ import annotations
 
@@ -81,8 +80,7 @@ class AtStop:
     with exit code 0, and the machine is stopped otherwise.
 
     The command gets the reason in its environment (`CAMTOOL_WHY`), never in its text, since it
-    comes from the program's comments.
-    """
+    comes from the program's comments."""
 
     def __init__(self, command: str) -> None:
         self._command = command

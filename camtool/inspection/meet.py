@@ -28,8 +28,7 @@ that follows confirms the result, or not.
 
 A certificate explains why no job holds: the dimension that is farthest from holding, and for each
 number of the machine the value that it alone would need. The value is found by bisection, and each
-step posts, simulates and inspects a job anew.
-"""
+step posts, simulates and inspects a job anew."""
 
 from __future__ import annotations
 
@@ -53,13 +52,7 @@ from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import minimise
 from camtool.inspection.tolerances import unbound_findings
 from camtool.inspection.uncertainty import CERTAIN, Machined, MachineVariant
-from camtool.inspection.verdicts import (
-    GUARD,
-    NOT_INSPECTED,
-    Tolerances,
-    inspect,
-    verdicts_of,
-)
+from camtool.inspection.verdicts import GUARD, NOT_INSPECTED, Tolerances, inspect, verdicts_of
 from camtool.jobs.changes import LEFT_DIGITS, Change, Left, changed_tables_of, text_of
 from camtool.jobs.keys import OPERATION, is_known
 from camtool.machine.model import Machine, Uncertainty
@@ -159,8 +152,7 @@ class MeetingTrial(Struct, frozen=True, eq=False):
 
     `verdicts` of the dimensions, with the `paths` of the drawing that form each; `missing`: number
     of dimensions that could not be inspected; `time_s` of the program; `left`: the allowances that
-    should improve it, computed from its edges.
-    """
+    should improve it, computed from its edges."""
 
     proposal: JobChanges
     verdicts: tuple[InspectedReport, ...]
@@ -196,8 +188,7 @@ def margin(each: InspectedReport) -> float:
     """Return the distance of a dimension within its nearer limit, in standard uncertainties,
     negative beyond it.
 
-    Unknown inputs have their worst values within their bounds.
-    """
+    Unknown inputs have their worst values within their bounds."""
     lower, upper = _limits_mm(each)
     return min(upper - each.high_mm, each.low_mm - lower) / _standard_mm(each)
 
@@ -232,8 +223,7 @@ class Certificate(Struct, frozen=True):
     that are unknown and unbounded, and `needs` the numbers of the machine that would each, if it
     alone were better, make all dimensions hold. `exact`: True if all would hold with every one of
     these numbers at its best. `together`: names of its contours that other contours share, so that
-    one allowance applies to all of them.
-    """
+    one allowance applies to all of them."""
 
     binding: InspectedReport | None
     unknown: tuple[str, ...] = ()
@@ -248,8 +238,7 @@ class Meeting(Struct, frozen=True, eq=False):
     `before` is the original job, `after` the best proposal with its `run`, posted (`brief` as
     `post_drawing` has it) and inspected; `trials` counts the programs tried besides the original
     one, and `all` is True if every necessary one was tried. `text`: the job file of the proposal.
-    `certificate`: the reason why it does not hold, else None.
-    """
+    `certificate`: the reason why it does not hold, else None."""
 
     before: MeetingTrial
     after: MeetingTrial
@@ -277,8 +266,7 @@ def meet(
     best one and a certificate.
 
     The result is never worse than the job as it is. Raises the errors of `post` and `inspect` for
-    that job.
-    """
+    that job."""
     _check_readable(case)
     asked_dimensions = tuple(
         each
@@ -334,8 +322,7 @@ def find_cheapest(
     with the best score.
 
     The second value is True if every proposal before it was tried, False if `max_trials` ended the
-    search. At most one proposal of each list in `choices`, the cheapest first, is applied.
-    """
+    search. At most one proposal of each list in `choices`, the cheapest first, is applied."""
     best, trials = before, {JobChanges(): before}
     for count, proposal in enumerate(_proposals(choices, trials), start=1):
         if count > max_trials:
@@ -357,8 +344,7 @@ def _proposals(
     """Yield all proposals of up to MAX_CHANGES changes, those with fewer changes first.
 
     Among those with the same number, allowances that a trial with one change less has computed
-    come first.
-    """
+    come first."""
     for count in range(1, MAX_CHANGES + 1):
         for base in list(trials.values()):
             if base.proposal.count == count - 1 and base.left and not base.proposal.left:
@@ -441,8 +427,7 @@ class JobContours(Struct, frozen=True, eq=False):
     `cut`: names that the operation in each row of the file cuts; `walls`: those of operations with
     an allowance; `depth`: number of contours around each; `head`: walls with the same head move
     alike, since an operation cannot be divided; `most_mm`: largest change of the allowance of a
-    wall; `of_path`: name of each drawn path.
-    """
+    wall; `of_path`: name of each drawn path."""
 
     cut: dict[int, tuple[str, ...]]
     walls: dict[int, tuple[str, ...]]
@@ -500,8 +485,7 @@ class JobContours(Struct, frozen=True, eq=False):
         """Return the allowances on walls, mm by the name of the contour, as changes of operations.
 
         An operation with several allowances is divided: inner contours come before those around
-        them.
-        """
+        them."""
         parts_found: list[Left] = []
         for row, names in self.walls.items():
             if not any(by_name.get(name) for name in names):
@@ -580,8 +564,7 @@ def _best_left(
     """Solve the linear programme at the top for the allowances (C,), mm.
 
     `sizes` maps (C,) to sizes (D, 2), and `limits` (D, 2) are the upper and the lower ones,
-    infinite for none.
-    """
+    infinite for none."""
     count, dims = len(max_allowances), len(limits)
     # Unknowns x: t_1 … t_D, then for each contour the allowance as two parts, positive and
     # negative, both 0 or more.
@@ -655,8 +638,7 @@ class Bench(Struct, eq=False, dict=True):
         """Try the original job.
 
         Raises the errors of posting it, and OptionError for a program with errors or if no
-        dimension with limits can be inspected.
-        """
+        dimension with limits can be inspected."""
         run = self._posted(JobChanges(), self.case.target)
         if run.report is None or run.failed:
             errors = (each for each in run.findings if each.severity is Severity.ERROR)
@@ -714,8 +696,7 @@ class Bench(Struct, eq=False, dict=True):
 
         A size beyond its limit is within it with a probability of at most one half: then the
         simulations for its uncertainty are skipped, and the uncertainty of the original job is
-        used.
-        """
+        used."""
         inspector = Inspector(run, self.case.tolerances.dimensions)
         verdicts: list[InspectedReport | None] = list(self._predict_verdicts(inspector))
         is_beyond = any(each is None or each.verdict == "out" for each in verdicts)
@@ -766,8 +747,7 @@ class Bench(Struct, eq=False, dict=True):
         """Yield each dimension with its sizes, and the verdict that follows if its uncertainty is
         that of the original job.
 
-        None for a dimension that is not cut, or that the original job did not cut.
-        """
+        None for a dimension that is not cut, or that the original job did not cut."""
         for one, size in zip(inspector.dimensions, inspector.sizes(), strict=True):
             stated = self._first.get(_key_of(one))
             if stated is None or not math.isfinite(size.low_mm + size.high_mm):
@@ -883,8 +863,7 @@ def _mechanics(machine: Machine) -> Iterator[_Number]:
     """Yield backlash, scale and squareness, each unless it is at its best.
 
     Backlash is at its best where it equals the compensation that the controller adds at reversals
-    (`camtool.inspection.uncertainty`).
-    """
+    (`camtool.inspection.uncertainty`)."""
     for index, name in enumerate("xy"):
         axis, cells = (machine.axes.x, machine.axes.y)[index], machine.play_map.used[index]
         ratio = axis.real_step_mm / axis.coded_step_mm

@@ -73,8 +73,7 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
 
     A run without a verification (of a program with errors) is returned unchanged. If a verdict is
     required and no dimension with limits was inspected, that is an error. Raises OptionError where
-    the job scales the part.
-    """
+    the job scales the part."""
     if run.verification is None or run.drawing is None or run.job is None:
         return run
     inspector = Inspector(run, tolerances.dimensions)
@@ -250,8 +249,7 @@ def _decided(
     """Return the probability that a dimension is within its limits, and the verdict that follows.
 
     Its values in the budget are three, from the index `first` on. With unknown inputs the
-    probability is the least favourable one; None if they leave the verdict open.
-    """
+    probability is the least favourable one; None if they leave the verdict open."""
     low, high = first + 1, first + 2
     lower, upper = -math.inf if limits[0] is None else limits[0], limits[1]
     off_low, off_high = (float(budget.at_most[value].sum()) for value in (low, high))
@@ -288,8 +286,7 @@ def _deciding(
     """Return the index of the value that decides a dimension's verdict: the one nearest to its
     limit, in standard uncertainties, after the worst change by unknown inputs.
 
-    Without limits it is the best fit.
-    """
+    Without limits it is the best fit."""
     lower, upper = limits
     if upper is None:
         return first

@@ -14,8 +14,7 @@ whose keys stand at its top. docs/jobs.md explains every key.
 
     defaults of the file ◀ keys of the operation ◀ flags        the nearest value counts
 
-A key that no operation of the job can use is refused, wherever it was given.
-"""
+A key that no operation of the job can use is refused, wherever it was given."""
 
 from __future__ import annotations
 
@@ -118,7 +117,6 @@ def read_job_file(path: Path, data: bytes | None = None) -> JobTables:
 def tables_of_flags(values: Mapping[str, Any]) -> JobTables:
     """Return the tables of a job that the given command-line flags amount to, by the names of
     their keys."""
-
     flags = Table({key: Given(value, flag_name(key)) for key, value in values.items()})
     return JobTables(flags.only(WHOLE), flags.only(PLACE), defaults=flags.only(OF_OPERATIONS))
 

@@ -7,8 +7,7 @@ propose to cut, one after the other, by `proposal_rank`:
 
 Each says why, and names a tool of the library where another one than the job's is right. What is
 larger comes later, so that parts are cut free last. Every other key stands there as a comment,
-with an example. docs/jobs.md has the rules in a table.
-"""
+with an example. docs/jobs.md has the rules in a table."""
 
 from __future__ import annotations
 

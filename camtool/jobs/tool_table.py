@@ -5,8 +5,7 @@
 A line holds words, a letter and a number each, in any order; T (the tool) and P (its pocket) must
 be there, each tool once. A remark follows `;`. Lines without words are skipped. Format: LinuxCNC's
 manual, "Tool Table Format". Lengths are in the machine's units, which the file does not name. Of
-the words, only the tool's number and its diameter are used here.
-"""
+the words, only the tool's number and its diameter are used here."""
 
 from __future__ import annotations
 
@@ -40,8 +39,7 @@ def read_tool_table(text: str, file: str) -> dict[int, TableTool]:
     """Return the tools of a table by number, in the order of its lines.
 
     OptionError, with file and line, for words that are malformed, repeated, missing or out of
-    range.
-    """
+    range."""
     tools: dict[int, TableTool] = {}
     for row, line in enumerate(text.split("\n"), start=1):
         words, _, remark = line.partition(";")

@@ -3,8 +3,7 @@
 The address of the page holds a key that is made anew at each start; without it nothing is
 answered. Requests whose host is not this server's own address are refused, and so is a WebSocket
 of a page from elsewhere: neither a page of another origin nor a scan of ports reaches the machine.
-One page commands, the others watch; what a page sends is decoded strictly.
-"""
+One page commands, the others watch; what a page sends is decoded strictly."""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 
 Between programs the machine is moved by hand (`camtool.target.wire.Hand`). A program that is
 loaded is sent by the same functions as those of `camtool send`, with the same journal. Requests
-come from other threads, and are carried out at the next turn of the driver, within `TICK_S`.
-"""
+come from other threads, and are carried out at the next turn of the driver, within `TICK_S`."""
 
 from __future__ import annotations
 
@@ -78,8 +77,7 @@ class MachineState(Struct, frozen=True):
     that are not acknowledged; the `block` that was acknowledged last (from 1; 0 for none); the end
     `programmed_mm` of the block that runs; the remaining time `left_s`. `stops`: it waits at a
     stop for the user, for example for another tool; `change_first`: it was left there to touch
-    off, and resumes with this block (0: it was not).
-    """
+    off, and resumes with this block (0: it was not)."""
 
     state: str = "closed"
     why: str = ""

@@ -1,8 +1,7 @@
 """A toolpath bent beforehand, so that the slides come out where it was wanted (`compensate`).
 
 wanted ─linear─▶ as the motors must go: scale and squareness undone, arcs stay arcs
-       ─take up─▶ backlash taken up at reversals, and what the controller compensates wrongly
-"""
+       ─take up─▶ backlash taken up at reversals, and what the controller compensates wrongly"""
 
 from __future__ import annotations
 
@@ -51,8 +50,7 @@ def compensate(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
     slides come out where `toolpath` says. Sources of the rows are kept; blocks are not.
 
     What remains: at a reversal that the controller compensates by too much, half of the excess
-    (see `_BacklashCompensator`), and the random part of the mechanics.
-    """
+    (see `_BacklashCompensator`), and the random part of the mechanics."""
     motors = motor_path(toolpath, machine)
     motion = _take_up_backlash(motors.toolpath, machine)
     row = motors.row[motion.row]
@@ -74,8 +72,7 @@ def motor_path(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
 
     An arc stays an arc where that changes its radius alike in all directions, or by less than the
     machine's fit tolerance; else it becomes an ellipse, which is fitted by arcs within that
-    tolerance.
-    """
+    tolerance."""
     square = np.eye(3)
     square[0, 1] = -math.tan(machine.mechanics.squareness_rad)
     scale = np.diag([axis.coded_step_mm / axis.real_step_mm for axis in machine.axes])
@@ -151,10 +148,7 @@ def _add_vertices(builder: ToolpathBuilder, vertices: Floats, end: Point, feed: 
             continue
         # Centre: off the midpoint of the chord by (1 − b²)/(4b) of it, to the left for b > 0.
         share = (1.0 - bulge * bulge) / (4.0 * bulge)
-        centre = (
-            0.5 * (x0 + x1) - share * (y1 - y0),
-            0.5 * (y0 + y1) + share * (x1 - x0),
-        )
+        centre = (0.5 * (x0 + x1) - share * (y1 - y0), 0.5 * (y0 + y1) + share * (x1 - x0))
         builder.arc(x1, y1, centre=centre, ccw=bulge > 0.0, feed=feed)
 
 
@@ -236,8 +230,7 @@ class _BacklashCompensator:
 
     Where the backlash changes with the region of the table, e does too: a step towards d is taken
     alone, one against it is waited for. Rapids and other moves in the air take up the backlash
-    as they go. An axis that does not move keeps what it has.
-    """
+    as they go. An axis that does not move keeps what it has."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine, regions: _Regions) -> None:
         self._toolpath, self._regions = toolpath, regions
@@ -375,8 +368,7 @@ class _Regions:
 
     A wanted path is cut at the edges of the regions. The regions belong to positions of
     the controller, which differ from the wanted ones by the backlash: near an edge the neighbour's
-    may be taken.
-    """
+    may be taken."""
 
     def __init__(self, machine: Machine) -> None:
         self._cells: tuple[PlayCells | None, ...] = machine.play_map.used
@@ -477,8 +469,7 @@ class MonotoneSegment(Struct, frozen=True):
         value is beyond an end.
 
         On an arc the angle θ with c + r cos θ (sin θ for Y) = value; of its two solutions the one
-        within the sweep.
-        """
+        within the sweep."""
         first, last = self.begin[axis], self.end[axis]
         share = min(max((value - first) / (last - first), 0.0), 1.0)
         if self.centre is None or axis == 2 or share in (0.0, 1.0):

@@ -5,8 +5,7 @@
 An item is cut in one go, before or after others. A `Contour` leaves its start (and perhaps its
 direction) to the order; a `Fixed` item is cut as it is. A `CutRun` is one stay of the tool in the
 stock: it goes down at its first point and comes up at its last one. Items are objects; the runs of
-a whole operation are held in columns (`Runs`).
-"""
+a whole operation are held in columns (`Runs`)."""
 
 from __future__ import annotations
 
@@ -73,8 +72,7 @@ class Runs(Struct, frozen=True, eq=False):
 
     Run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices` (N, 4) and of `feed_mm_min`
     (N,), in which the last value of a run is unused; `plunge_mm_min`, `dwell_s` (R,) and `names`
-    (R) are as in a CutRun. ValueError for a vertex that is not finite.
-    """
+    (R) are as in a CutRun. ValueError for a vertex that is not finite."""
 
     vertices: Floats
     feed_mm_min: Floats
@@ -148,8 +146,7 @@ class Contour(Struct, frozen=True, eq=False):
     path may begin; empty: any vertex that is no joint within an arc. `source`: the index of its
     path in the placed drawing. `material_left`: the material that stays lies to the left of the
     path; False: to the right; None: on both sides (engraved). `outline`: for the nesting, the
-    closed path of which this is a part; None: the path itself.
-    """
+    closed path of which this is a part; None: the path itself."""
 
     path: Polyline
     setting: Setting
@@ -166,8 +163,7 @@ class Fixed(Struct, frozen=True, eq=False):
 
     `outline`: for the nesting, a closed path around them, if there is one. `centre_lines`: lines
     of the tool's centre that bound a slot beside a contour; the slot holds what lies within that
-    contour.
-    """
+    contour."""
 
     runs: tuple[CutRun, ...]
     setting: Setting

@@ -3,8 +3,7 @@
 A job places the drawing (`Placement`), may describe the stock (`Stock`), and lists operations in
 the order in which they are cut. An operation chooses paths by layer and colour, and gives the
 tool, the side, the depth, and how the tool goes in and out. What is None is left to the machine.
-`job_of` makes the job of a single operation from flat settings, as flags give them.
-"""
+`job_of` makes the job of a single operation from flat settings, as flags give them."""
 
 from __future__ import annotations
 
@@ -180,8 +179,7 @@ def at_least_zero(name: str, value: float, unit: str, max_value: float | None = 
     """Raise OptionError for a number below 0 or implausibly large."""
     if not (math.isfinite(value) and value >= 0.0):
         raise OptionError(
-            f"{_quantity(name, value, unit)} is not 0 or more",
-            mend=f"give a {name} of 0 or more",
+            f"{_quantity(name, value, unit)} is not 0 or more", mend=f"give a {name} of 0 or more"
         )
     _at_most(name, value, unit, max_value)
 
@@ -278,8 +276,7 @@ class Tool(FrozenRecord):
     whether it cuts at its centre, and so can plunge. Above its flutes it is a cylinder, the shank,
     up to the holder: a cylinder too, from `stickout_mm` above the tip on and `holder_length_mm`
     long (None: endless). Limits of the feed per tooth, mm, and of the cutting speed, m/min, are
-    (least, greatest). `materials`: those for which it has presets.
-    """
+    (least, greatest). `materials`: those for which it has presets."""
 
     diameter_mm: float = 0.0
     kind: str = "flat"
@@ -474,8 +471,7 @@ class Operation(FrozenRecord):
     for a drill of no width). `material`: that of the tool's preset, "" where none was taken;
     `preset`: the keys of the operation that it gave. `own`: names and values of the fields that
     its kind alone has, in the order of names.
-    Raises OptionError for what no operation can be.
-    """
+    Raises OptionError for what no operation can be."""
 
     kind: str = "profile"
     name: str = ""
@@ -648,8 +644,7 @@ class Operation(FrozenRecord):
         found by its name among `others`, earlier ones first; unchanged if it names none.
 
         It takes over the paths and the depth of that one. OptionError for an operation that leaves
-        no rest.
-        """
+        no rest."""
         if not self.rest:
             return self
         if self.rest_of is not None:
@@ -830,8 +825,7 @@ class Operation(FrozenRecord):
         """Return the operation as its kind completes it, with its breakthrough converted to a
         depth.
 
-        OptionError for an operation that is impossible in this stock (None: not known).
-        """
+        OptionError for an operation that is impossible in this stock (None: not known)."""
         settle = self.contract.settle
         settled: Operation = function_of(settle)(self, stock) if settle else self
         return settled.through(stock)

@@ -7,8 +7,7 @@ their packages. docs/write-an-operation.md adds one.
 
 The record holds facts and the names of functions ("package.module:function"), which are imported
 when they are first called: the flags of a command need all kinds, but no geometry. A kind that
-cannot be loaded is left out; whoever uses it gets the error.
-"""
+cannot be loaded is left out; whoever uses it gets the error."""
 
 from __future__ import annotations
 
@@ -39,24 +38,10 @@ RESTS = ("", "corners", "floor")
 
 COMMON_KEYS = ("name", "kind", "feed", "plunge_feed", "spindle", "coolant")
 
-SELECTING_KEYS = (
-    "layers",
-    "colours",
-    "select",
-    "select_size",
-    "select_area",
-    "select_entities",
-)
+SELECTING_KEYS = ("layers", "colours", "select", "select_size", "select_area", "select_entities")
 """Keys by which an operation takes paths of the drawing."""
 
-WALL_KEYS = (
-    "direction",
-    "allowance",
-    "finish",
-    "finish_feed",
-    "finish_spindle",
-    "finish_tool",
-)
+WALL_KEYS = ("direction", "allowance", "finish", "finish_feed", "finish_spindle", "finish_tool")
 """Keys of operations that leave walls."""
 
 
@@ -90,8 +75,7 @@ class OperationKind(FrozenRecord):
     what it takes are nets of copper, which are to be whole afterwards, and apart.
 
     Words: `cut_name` is what is cut of the stock ("" for parts and holes), `reason` why its
-    contours lie on no side, as `camtool job` says it.
-    """
+    contours lie on no side, as `camtool job` says it."""
 
     name: str
     work: str
@@ -216,8 +200,7 @@ def kind_named(name: str) -> OperationKind:
         )
     if name not in kinds:
         raise OptionError(
-            f"unknown kind of operation {name!r}",
-            mend=f"use one of {', '.join(kinds)}",
+            f"unknown kind of operation {name!r}", mend=f"use one of {', '.join(kinds)}"
         )
     return kinds[name]
 

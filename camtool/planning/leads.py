@@ -9,8 +9,7 @@ A lead may lie where the tool does no harm: nowhere on the other side of the con
 material is that is to stay, and nowhere nearer to other wanted lines than the tool's radius (and
 the allowance, where the operation leaves one on them). Both
 are decided exactly: cut where it meets the contour, each of its pieces lies on one side, and so
-its midpoint shows which. A lead that does not fit is halved, and at last left out.
-"""
+its midpoint shows which. A lead that does not fit is halved, and at last left out."""
 
 from __future__ import annotations
 
@@ -80,8 +79,7 @@ class Border(Struct, frozen=True, eq=False):
         """Return the segments from which a lead of this size at a place (2,) of the contour must
         keep away.
 
-        An engraved contour's own cut there does not count.
-        """
+        An engraved contour's own cut there does not count."""
         reach = 2.0 * size_mm + self.reach_mm + max(self.allowance_mm, 0.0)
         near_lines = segments_near(self.keep_out.lines, place, reach)
         if self.free_left is None and len(near_lines):
@@ -158,8 +156,7 @@ def _lead_bulge(sign: float, material_left: bool | None) -> float:
     """Return the bulge of a lead seen from the contour outwards: a quarter arc to the free side.
 
     What is free on the right of the travel is on the right of a lead-out, and on the left of a
-    lead-in, which is seen backwards.
-    """
+    lead-in, which is seen backwards."""
     if material_left is None:
         return 0.0
     return QUARTER * (-sign if material_left else sign)
@@ -202,8 +199,7 @@ def segments_near(lines: Polylines, place: Floats, reach_mm: float) -> Segments:
     """Return the segments of paths that may come within `reach_mm` of a place (2,), and few
     others.
 
-    No point of an arc of a half circle at most is farther from its start than π/2 of its chord.
-    """
+    No point of an arc of a half circle at most is farther from its start than π/2 of its chord."""
     vertices, offsets = lines.vertices, lines.offsets
     following = np.arange(1, len(vertices) + 1)
     following[offsets[1:] - 1] = offsets[:-1]
@@ -223,8 +219,7 @@ def signed_distances(path: Polyline, points: Floats) -> Floats:
 
     The left of a closed path is its inside if it runs CCW. Beside an open path the nearest place
     decides: on a line or arc its side there, at a vertex the side of the bisector of the
-    directions there; beyond its ends, the tangents go on.
-    """
+    directions there; beyond its ends, the tangents go on."""
     segments = Segments.of(path)
     if path.closed:
         is_inside = inside(points, segments)

@@ -37,8 +37,7 @@ def _rounded(places: Floats) -> Floats:
 
     The ends of a straight wall differ by some 1e-15 of their size, as offsets, tabs and ramps come
     to them. Where a dialect's last decimal is a tie (a cutter of 1/8 inch has a radius of 1.5875)
-    one end would be rounded up and the other down, and the wall written askew.
-    """
+    one end would be rounded up and the other down, and the wall written askew."""
     return np.asarray(np.round(places, ROUNDED_DECIMALS) + 0.0)
 
 
@@ -53,8 +52,7 @@ def link(
     `worked`: (setting, runs in order of cutting) of each operation. Rows know their run, counted
     through all of them. `approaches` makes the function that returns the place from which a run is
     approached; a new one is made after each tool change. All places are rounded to
-    ROUNDED_DECIMALS.
-    """
+    ROUNDED_DECIMALS."""
     safe_z_mm = worked[0][0].safe_z_mm
     feed_z_mm = machine.defaults.feed_z_mm
     heights = (safe_z_mm, None if feed_z_mm is None or feed_z_mm >= safe_z_mm else feed_z_mm)
@@ -261,8 +259,7 @@ def _add_cuts(
     begins and ends at safe z, the first of `heights`; it goes down as a rapid to the second of
     these (None: not), and from there at the plunge feed.
 
-    (the approach) · across · (as a rapid) · down · the cuts · (the dwell) · up
-    """
+    (the approach) · across · (as a rapid) · down · the cuts · (the dwell) · up"""
     safe_z_mm, feed_z_mm = heights
     come_down = 2 + (feed_z_mm is not None)
     runs, count = run_lot.runs, len(run_lot.runs)

@@ -5,8 +5,7 @@ open one from either end. The order and the variants are searched together: near
 first, then reversals and moves of parts of the order as long as they make it shorter, and the best
 variants for that order, exactly, layer by layer (`camtool.kernels.tours`). Every step of the
 search keeps what must be cut before what (`must_precede`: a part is cut free after everything
-within it has been cut). The same input always gives the same order.
-"""
+within it has been cut). The same input always gives the same order."""
 
 from __future__ import annotations
 
@@ -89,8 +88,7 @@ def choices_of(items: Items) -> Choices:
     and comes up.
 
     A closed contour may begin at its `starts` or at any joint, and ends there; its direction
-    changes nothing. An open one runs as drawn, and if reversible also from its end.
-    """
+    changes nothing. An open one runs as drawn, and if reversible also from its end."""
     columns = [_fixed_ends(items), *_contour_ends(items)]
     owner, ends = (np.concatenate(each) for each in zip(*columns, strict=True))
     order = np.argsort(owner, kind="stable")
@@ -127,8 +125,7 @@ def best_order(
 
     `before` (P, 2): the first item of a pair is cut before the second. The tool comes from
     `from_point` and goes to `to_point` at last (None: it stays where it is). OptionError when
-    items would have to be cut before themselves.
-    """
+    items would have to be cut before themselves."""
     if len(choices) == 0:
         return np.empty(0, dtype=np.int64)
 
@@ -323,8 +320,7 @@ def must_precede(items: Items) -> Ints:
     """Return pairs (P, 2) of items, ascending; the first must be cut before the second.
 
     An item goes before the smallest closed Contour, or slot, that holds it or any of its runs;
-    there are no other conditions. Contours that cross do not hold each other.
-    """
+    there are no other conditions. Contours that cross do not hold each other."""
     shapes, shape, item = _shapes(items)
     parent = Nesting(shapes).levels.parent
     order = np.argsort(shape, kind="stable")
@@ -345,8 +341,7 @@ def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
     """Return paths that show where items lie, and pairs (J,), (J,) of a path and the item that it
     belongs to.
 
-    Only the path of a Contour, or the one round a slot, is closed and can hold items.
-    """
+    Only the path of a Contour, or the one round a slot, is closed and can hold items."""
     contours, owner = contours_of(items), _contour_rows(items)
     lines, shape = _lines_of(contours), np.arange(len(contours))
     outlines = [contour.outline for contour in contours]

@@ -2,8 +2,7 @@
 
 Pieces of lines and arcs keep to them (`camtool.kernels.passes`). Lengths may run below 0 and
 beyond the whole of a closed path: that is further round. Arcs that were split, since a polyline
-holds half circles at most, become one arc again (`joints`, `cuts`).
-"""
+holds half circles at most, become one arc again (`joints`, `cuts`)."""
 
 from __future__ import annotations
 
@@ -129,8 +128,7 @@ class MeasuredPath:
         """Return the length along the path to its point nearest to (x, y), mm.
 
         Measured from the start of an arc of the curvature k, with the point at x along the tangent
-        and y along the left normal, the foot of the point is atan2(k x, 1 − k y) / k along.
-        """
+        and y along the left normal, the foot of the point is atan2(k x, 1 − k y) / k along."""
         place = np.array([point])
         nearest_place = nearest(place, self.segments)
         row = int(nearest_place.segment[0])
@@ -148,8 +146,7 @@ class MeasuredPath:
         """Return the vertices (k, 3) x, y, bulge of the path from one length to another, backwards
         if `end` is less than `begin`.
 
-        Vertices nearer than POSITION_EPS_MM to an end are merged with it. The last bulge is 0.
-        """
+        Vertices nearer than POSITION_EPS_MM to an end are merged with it. The last bulge is 0."""
         vertices = piece(self.paths.tracks, self.index, begin, end)
         return np.ascontiguousarray(vertices[:, [0, 1, 3]])
 
@@ -157,8 +154,7 @@ class MeasuredPath:
         """Return, for each length (J,), the segment at `ahead_mm` beyond it, and the share of that
         segment at the length itself.
 
-        Lengths beyond the ends of an open path count as its ends.
-        """
+        Lengths beyond the ends of an open path count as its ends."""
         inside = lengths
         if self.closed:
             inside = np.mod(lengths + ahead_mm, self.total_mm) - ahead_mm
@@ -222,8 +218,7 @@ def joints(lines: Polylines) -> Bools:
     (not those within an arc).
 
     On a circle every vertex is as good as another, and all are True; so are all vertices of open
-    paths.
-    """
+    paths."""
     is_joint = np.ones(len(lines.vertices), dtype=np.bool_)
     rows = np.flatnonzero(np.repeat(lines.closed, np.diff(lines.offsets)))
     segments = Segments.of(lines)
@@ -242,8 +237,7 @@ def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
 
     Run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices` (N, 4), x, y, z, bulge, and
     of `feed_mm_min` (N,), that of the move which leaves the vertex. A circle becomes a single arc
-    that ends where it starts, a helix one arc for each turn.
-    """
+    that ends where it starts, a helix one arc for each turn."""
     leaves = np.ones(len(vertices), dtype=np.bool_)
     leaves[first[1:] - 1] = False
     rows = np.flatnonzero(leaves)

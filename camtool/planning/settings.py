@@ -163,8 +163,7 @@ def feeds_of(operation: Operation, machine: Machine) -> Feeds:
 
     A plunge feed that is not given is the machine's share of the feed of the cut (without one,
     that feed), or the highest that Z can. OptionError for feeds above what the machine takes at
-    all, naming the highest.
-    """
+    all, naming the highest."""
     given_feed = operation.plunge_feed_mm_min
     cut = operation.feed_mm_min
     cut = machine.feed.default_mm_min if cut is None else cut

@@ -14,8 +14,7 @@ Not every contour bounds material, though. These do not count:
 - the pocket or bore of another operation that is less deep than the cut: what is drawn within it
   goes through its floor (a counterbore and its bore);
 - of what is not cut: what has a line type of its own, as centre lines, hidden edges and pitch
-  circles have; what is on a layer of `Job.frames`; and what runs along a contour that is cut.
-"""
+  circles have; what is on a layer of `Job.frames`; and what runs along a contour that is cut."""
 
 from __future__ import annotations
 
@@ -56,8 +55,7 @@ class Seen(Struct, frozen=True, eq=False):
     `rim` (M,): the contour is the edge of a part, so that its inside stays. `holder` (M,): the
     smallest contour around it, −1 if none. `by_uncut` (M,): it would be the other side without the
     contours that are not cut; `by_frames` (M,): with those that count as frames. `bounds` (M,):
-    the contour bounds material.
-    """
+    the contour bounds material."""
 
     rim: Bools
     holder: Ints
@@ -383,8 +381,7 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
     drawing.
 
     OptionError, which lists what there is, if the drawing is not empty but the operation takes
-    nothing of it.
-    """
+    nothing of it."""
     index = np.flatnonzero(sides.taken_by(operation)).tolist()
     marks = [mark for mark in drawing.marks if takes_mark(operation, mark)]
     is_owed = operation.contract.takes_drawn

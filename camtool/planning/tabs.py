@@ -15,8 +15,7 @@ Tabs stand at the centre of equal shares of the path, or where they are wanted b
 across a corner, its slopes included: not at a vertex where the path turns, and not on the arc on
 which the tool goes round a corner of the drawing. One that would moves to the nearest place where
 it does not, if there is one: within its share first, on a gentle bend if nothing is straight. The
-start of a closed path is where two shares meet, so that no tab stands on the seam.
-"""
+start of a closed path is where two shares meet, so that no tab stands on the seam."""
 
 from __future__ import annotations
 
@@ -127,8 +126,7 @@ def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
 
     Tabs hold parts: if an operation cuts parts free, its holes and open paths get no tabs, nor do
     contours that are too short. If it cuts none free, everything has tabs as asked. If nothing is
-    long enough, `tabs_of` raises the error.
-    """
+    long enough, `tabs_of` raises the error."""
     if not contours or not contours[0].setting.operation.tabs:
         return contours, []
     if contours[0].setting.operation.tabs.at_mm is not None:
@@ -223,8 +221,7 @@ def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Find
     """Return the tabs of a contour, whose path from its start is `along`, and findings for those
     that do not fit.
 
-    OptionError for tabs that are higher than the cut is deep or together longer than the path.
-    """
+    OptionError for tabs that are higher than the cut is deep or together longer than the path."""
     operation = contour.setting.operation
     tabs = operation.tabs
     if tabs is None:
@@ -576,8 +573,7 @@ def raised_over_bridges(
 
     A tool of radius r cuts into it where its centre is nearer than r to the rectangle. There its
     run is raised to the top of the bridge, as by a tab of its own; so the neighbour has a bridge
-    there too, which is a finding.
-    """
+    there too, which is a finding."""
     if not bridges or not len(runs):
         return RaisedRuns(runs, ())
     reach = operation.tool.radius_mm

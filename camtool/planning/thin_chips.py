@@ -9,8 +9,7 @@ the front half of the tool's circle, where the chip is thinnest, to the farthest
 thin wall ahead of the tool has thick chips.
 
 The engagement is a bound for short chords, and the feed is one of few levels between that at the
-limit and the greatest, so that it changes seldom and never exceeds what keeps the thickness.
-"""
+limit and the greatest, so that it changes seldom and never exceeds what keeps the thickness."""
 
 from __future__ import annotations
 
@@ -79,8 +78,7 @@ def thin_chip_feeds(
     (K, 9) as `camtool.kernels.engagement` reads them, and the line or arc (K,) of the path that
     each is a part of.
 
-    What was air before is taken for stock, so that the feed is lower there than it might be.
-    """
+    What was air before is taken for stock, so that the feed is lower there than it might be."""
     every = np.concatenate([moves for moves, _ in paths])
     ends = np.concatenate([every[:, :2], every[:, 2:4]])
     extents = np.stack([ends.min(axis=0), ends.max(axis=0)])

@@ -1,8 +1,7 @@
 """A prepared program on its way to its machine: its conversation, its journal and its outcome.
 
 `camtool send` and the panel both send programs by these functions, so that a program which one of
-them has begun can be continued by the other.
-"""
+them has begun can be continued by the other."""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 
 The conversation decides what is sent; the driver only carries bytes. The journal records bytes
 before they are sent, except the bytes that stop the machine, which wait for nothing. Any failure
-here, except of the port itself, stops the machine before the program ends.
-"""
+here, except of the port itself, stops the machine before the program ends."""
 
 from __future__ import annotations
 

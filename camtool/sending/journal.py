@@ -10,8 +10,7 @@ something of the new one is sent.
 
     {"journal": 1, "program": "logo.nc", "sha256": "…", "machine": "…", "first": 0, "at": "…"}
     {"s": 1.25, "sent": 12, "acknowledged": 9, "done": 0, "block": -1, "last": 11, …}
-    {"s": 9.1, "end": "stopped", "why": "", "sent": 34, …, "place": [1, 2, 0.5], "still": true}
-"""
+    {"s": 9.1, "end": "stopped", "why": "", "sent": 34, …, "place": [1, 2, 0.5], "still": true}"""
 
 from __future__ import annotations
 
@@ -59,13 +58,7 @@ class Journal:
     """A journal that is being written. Raises OutputError when it cannot be written, since the
     progress of the program would be lost."""
 
-    def __init__(
-        self,
-        file: Path,
-        head: Mapping[str, Any],
-        *,
-        appends: bool = False,
-    ) -> None:
+    def __init__(self, file: Path, head: Mapping[str, Any], *, appends: bool = False) -> None:
         """Begin a journal, which replaces an earlier one as soon as something has been sent; with
         `appends`, append to the earlier one."""
         self.file = file

@@ -2,8 +2,7 @@
 
 The host carries bytes between a port and a `WiredTwin`, and keeps the time. It serves one client
 at a time; a new one finds the machine as the last one left it, and opens the line, which resets
-some controllers.
-"""
+some controllers."""
 
 from __future__ import annotations
 

@@ -77,8 +77,7 @@ class ControllerModel(ABC, Generic[ControllerT, DialectT]):
         """Return the moves as the controller rounds them before interpolation, row by row; the
         error of interpolation is measured from these. ProgramError for rows that it cannot follow.
 
-        By default nothing is rounded, and homing ends at machine zero.
-        """
+        By default nothing is rounded, and homing ends at machine zero."""
         check_positions(toolpath, machine)
         return with_event_positions(
             toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64)

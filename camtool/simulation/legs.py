@@ -3,8 +3,7 @@
     legs of a program, block by block ─legs_fill─▶ commanded ─Mechanics─▶ slides, in chunks
 
 A sample is the position after one pass of the controller's loop, which moves at least one axis.
-Memory grows with the legs that are given at a time, not with their steps.
-"""
+Memory grows with the legs that are given at a time, not with their steps."""
 
 from __future__ import annotations
 

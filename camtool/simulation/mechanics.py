@@ -9,8 +9,7 @@ amount by which the angle between +X and +Y is less than 90° (for q > 0, Y lean
     x = x_slide + y_slide · tan q,      y = y_slide.
 
 The real step of Y is thus measured square to X, as on a part. For q > 0 a commanded square of side
-a has a longer diagonal towards (+, +): the squares of its diagonals differ by 4 a² tan q.
-"""
+a has a longer diagonal towards (+, +): the squares of its diagonals differ by 4 a² tan q."""
 
 from __future__ import annotations
 
@@ -58,8 +57,7 @@ class Mechanics:
     says.
 
     Scale and squareness act about part zero; compensation is in whole steps; only the `effects`
-    act.
-    """
+    act."""
 
     def __init__(self, machine: Machine, start_mm: Floats, effects: Effects) -> None:
         direction = 1 if machine.controller.start_direction == "+" else -1

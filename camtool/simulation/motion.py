@@ -20,8 +20,7 @@ class Ledger(Struct, frozen=True, eq=False):
     steps that the controller adds at reversals. `iterations` (R,): passes of the interpolator,
     also idle ones. `steps` (R, 3) of the axes, without compensation. `reversals` (R, 3) of the
     axes, each of which is one compensation. `ended` (R,): False when the stop test of an arc is
-    never met; its samples then stop at the nearest approach to the programmed end.
-    """
+    never met; its samples then stop at the nearest approach to the programmed end."""
 
     row: Ints
     duration_s: Floats
@@ -66,8 +65,7 @@ class Chunk(Struct, frozen=True, eq=False):
     take time but have no samples.
 
     Every row up to the end of the program is in the ledger of at least one chunk, in order; rows
-    without motion have no samples.
-    """
+    without motion have no samples."""
 
     row: Ints
     commanded: Floats
@@ -113,8 +111,7 @@ class Effects(FrozenRecord):
 
     `play`: backlash of the axes, also by region; `compensation` that the controller adds against
     it; `scale`: real against coded step; `squareness` of X and Y; `repeatability`: random, by a
-    seed.
-    """
+    seed."""
 
     play: bool = True
     compensation: bool = True

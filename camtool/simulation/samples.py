@@ -4,8 +4,7 @@
 its own lines and arcs. A line is one piece; an arc is divided where an axis reverses (right of,
 above, left of and below its centre), so that X and Y are monotone in every piece. Each piece is
 sampled evenly, its end included. Whatever the spacing, the ends of all moves and the reversals of
-all axes are samples, so extents and reversals are exact.
-"""
+all axes are samples, so extents and reversals are exact."""
 
 from __future__ import annotations
 
@@ -346,8 +345,7 @@ def _arc_pieces(arms: PolarArcs) -> _Pieces:
     """Return the arcs divided where an axis reverses.
 
     These places lie at angles k·π/2. In the direction of the arc (σ = ±1) from its start at σ·a,
-    the next ones are k = ⌊σa/(π/2)⌋ + 1, + 2, ...
-    """
+    the next ones are k = ⌊σa/(π/2)⌋ + 1, + 2, ..."""
     quarter = 0.5 * np.pi
     progress = np.sign(arms.sweep) * arms.angle
     next_turn = np.floor(progress / quarter)[:, None] + np.arange(1, TURNS_OF_ARC + 1)

@@ -5,8 +5,7 @@
 Where the slides are at the start of a line follows from the lines before it without their steps;
 then each row can be judged on its own. Rows are judged in parts whose size does not depend on the
 number of threads, and each part has a trace of its own: results are the same to the last bit,
-however many threads there are.
-"""
+however many threads there are."""
 
 from __future__ import annotations
 

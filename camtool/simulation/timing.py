@@ -1,8 +1,7 @@
 """Times of samples: when the controller reaches each sample of its motion.
 
 A controller's loop either outputs a step and then waits (`SampleClock`), or its samples lie on a
-planned profile and are reached at the end of their time (`camtool.simulation.samples`).
-"""
+planned profile and are reached at the end of their time (`camtool.simulation.samples`)."""
 
 from __future__ import annotations
 

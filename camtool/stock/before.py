@@ -2,8 +2,7 @@
 
 Over a point the material reaches from the *floor*, which cuts from the other face have raised, up
 to the *top*, which cuts from this face have lowered; it is gone where the floor is not below the
-top. Cuts of the other set-ups are those of their planned toolpaths, turned into this frame.
-"""
+top. Cuts of the other set-ups are those of their planned toolpaths, turned into this frame."""
 
 from __future__ import annotations
 

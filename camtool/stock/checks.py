@@ -4,8 +4,7 @@ All of them need the moves of the program, and know from the job alone what shou
 tried to prove that nothing is too deep, or left (`camtool.stock.proofs`). Where that is not so,
 depths are exact at each point that is looked at: along the axis and the edges of every cut, since
 nothing is cut but by moves; on a lattice over the stock for what is left. The worst of them is
-then searched for around it by branch and bound.
-"""
+then searched for around it by branch and bound."""
 
 from __future__ import annotations
 
@@ -240,11 +239,7 @@ class _Checks:
     """The stock of a program, and what the job asks of it."""
 
     def __init__(
-        self,
-        decoded: Toolpath,
-        request: StockRequest,
-        moves: StockMoves,
-        deep_mm: float,
+        self, decoded: Toolpath, request: StockRequest, moves: StockMoves, deep_mm: float
     ) -> None:
         self.decoded, self.request, self.moves = decoded, request, moves
         tools = dict.fromkeys(operation.tool for operation in request.operations)
@@ -299,7 +294,6 @@ class _Checks:
 
     def too_deep(self, severity: Severity) -> Iterator[Finding]:
         """Yield CUT_TOO_DEEP for places where the stock is lower than allowed."""
-
         trial = self._tried(Gouges)
         if trial.holds:
             return
@@ -324,7 +318,6 @@ class _Checks:
 
     def left(self) -> Iterator[Finding]:
         """Yield MATERIAL_LEFT for places where the stock is higher than the job asks."""
-
         leftover_of, upper = self.stock.leftover
         boxes = [layer.curves.boxes for layer in self.solid.must if len(layer.lines)]
         if not boxes:

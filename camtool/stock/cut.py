@@ -6,8 +6,7 @@ beside the other, heights differ by the whole depth, in a strip as thin. So the 
 whether the surface of the one lies within a distance of the surface of the other: over a point it
 does where, of the other, all tools begun so much farther out cut no higher than that much above
 the one. The least distance with which this holds everywhere is the distance of the two stocks; it
-is measured in the plane and along Z alike, whichever is more.
-"""
+is measured in the plane and along Z alike, whichever is more."""
 
 from __future__ import annotations
 
@@ -165,8 +164,7 @@ class StockDifference(Struct, frozen=True):
     """The difference of two stocks.
 
     `deeper`: the greatest distance, mm, by which the second cuts where the first does not, with
-    its place; `shallower`: the reverse. `more_mm3`, `less_mm3`: the volumes of both.
-    """
+    its place; `shallower`: the reverse. `more_mm3`, `less_mm3`: the volumes of both."""
 
     deeper: Bracket
     shallower: Bracket

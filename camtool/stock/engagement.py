@@ -7,8 +7,7 @@ ones have cleared at its depth. Where the tool goes down through the stock it is
 that is its entry, up to a length of its circumference beyond it, and does not count.
 
 Only tools that are as wide at their tip as above are judged. Others (V bits, ball and bull noses,
-drills) clear nothing here, so that the bounds of the tools behind them hold all the same.
-"""
+drills) clear nothing here, so that the bounds of the tools behind them hold all the same."""
 
 from __future__ import annotations
 
@@ -148,8 +147,7 @@ def engagement_of(
 
     `limits`: the operation of each move (M,), ascending, and the limit of each operation (K,),
     rad. Then only the greatest bound of each operation is that tight (within FINE_RAD if it is
-    above the limit); all others are merely bounds.
-    """
+    above the limit); all others are merely bounds."""
     moves, index = _parted(moves)
     number, limit = (np.zeros(len(moves), np.int64), np.zeros(1))
     if limits is not None:

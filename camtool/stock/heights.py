@@ -4,8 +4,7 @@ No grid: the height over a point is the least of z + profile(distance) over all 
 value of a difference of heights over a region is bracketed by branch and bound. Squares whose
 upper bound does not exceed the greatest value found so far by more than the tolerance are done;
 the others are divided in four. What is printed as proved is the greatest upper bound of all
-squares that are done.
-"""
+squares that are done."""
 
 from __future__ import annotations
 
@@ -119,8 +118,7 @@ def greatest_value(
     `value` gives it at points (J, 2); `upper` gives upper bounds over squares, whose middle and
     half a side are the rows of (K, 3), −inf for squares that are of no interest. Values below
     `floor` are not of interest: where all are, the bracket is (−inf, floor). A value above
-    `enough_value` ends the search, and the bracket is then wider.
-    """
+    `enough_value` ends the search, and the bracket is then wider."""
     squares = _first_squares(box)
     best, place, proved, examined = (
         -np.inf,
@@ -180,8 +178,7 @@ def integral(
     `quarter_means` returns bounds of the function's means over the quarters of squares; `extremes`
     bounds of its values, for squares that lie partly outside the box. The squares with the largest
     gap between the bounds are divided again and again. The place of the bracket is that of the
-    square with the largest part.
-    """
+    square with the largest part."""
     squares, low, high = _quarters(_first_squares(box), quarter_means, extremes, box)
     while True:
         total = float(low.sum()), float(high.sum())

@@ -11,8 +11,7 @@ that of the widest:
   copper that is left beside it.
 
 Arcs of the drawing and round ends of grooves become chords within FLAT_MM, on the side that keeps
-this true for grooves.
-"""
+this true for grooves."""
 
 from __future__ import annotations
 
@@ -80,8 +79,7 @@ def judge_nets(
 ) -> NetReport:
     """Judge the nets of copper after these moves.
 
-    `box_mm`: the blank (left, low, right, high); None: MARGIN_MM around the contours.
-    """
+    `box_mm`: the blank (left, low, right, high); None: MARGIN_MM around the contours."""
     nets = list(shapely.get_parts(_area(copper.contours)))
     if not nets:
         return NetReport(0, (), (), None, None)

@@ -11,8 +11,7 @@ BEFORE.
 
 Backwards in time, gone cells come back, those cut last first: where one joins two pieces, its move
 has parted them, and the one that is not held has come loose then. Of a loose piece that is cut in
-two only the smaller part counts, and only if something is left of it at the end.
-"""
+two only the smaller part counts, and only if something is left of it at the end."""
 
 from __future__ import annotations
 

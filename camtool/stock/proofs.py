@@ -20,8 +20,7 @@ and z; so a whole move is fine if its ends are, with s bounded from below by a l
 d, deep enough. It is left of a region where no move covers it: squares are divided until one or
 two moves cover each of them (`StockTree.greatest_over`), less what lies beyond a wall.
 
-What the one layer or the one tool does not show is searched for by squares.
-"""
+What the one layer or the one tool does not show is searched for by squares."""
 
 from __future__ import annotations
 
@@ -231,10 +230,7 @@ class _Chords(Struct, frozen=True, eq=False):
             np.concatenate([self.middle - half, self.middle + half]),
             np.concatenate([half, half]),
             np.concatenate(
-                [
-                    np.column_stack([self.z[:, 0], middle]),
-                    np.column_stack([middle, self.z[:, 1]]),
-                ]
+                [np.column_stack([self.z[:, 0], middle]), np.column_stack([middle, self.z[:, 1]])]
             ),
             np.concatenate([self.tool, self.tool]),
         )

@@ -8,8 +8,7 @@ up is never wrong.
 
 so that a way that is cleared exactly is accepted, and a rapid that gets farther than the tolerance
 into a wall never is. Squares round each rapid are divided until the stock is proved to lie below
-the rapid over all of a square, or a point is found where it does not.
-"""
+the rapid over all of a square, or a point is found where it does not."""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 
 The samples of a simulation are thinned to straight moves, so that every sample lies within
 `THIN_MM` or a step of the axes of them; samples themselves lie on the path, which bends away from
-the line between two of them by spacing² / 8 r at most.
-"""
+the line between two of them by spacing² / 8 r at most."""
 
 from __future__ import annotations
 

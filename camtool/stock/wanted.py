@@ -34,8 +34,7 @@ there `high` is asked only where its corner has passed, and higher by the ridge.
 
 Walls are vertical steps: a tool that runs a micrometre beside its path would cut the full depth
 too deep there. Errors in the plane are judged by other figures, so `low` begins `wall_mm` beyond
-the wall and `high` ends as much before it.
-"""
+the wall and `high` ends as much before it."""
 
 from __future__ import annotations
 

@@ -6,8 +6,7 @@ the model of its controller. Methods with a body are optional: a target override
 differs. docs/write-a-post.md builds a complete target.
 
 A list of all targets uses only the attributes of each; so a target imports its writer, its reader
-and its model within the methods that need them, or names them with `lazy_call`.
-"""
+and its model within the methods that need them, or names them with `lazy_call`."""
 
 from __future__ import annotations
 
@@ -100,8 +99,7 @@ class Target(ABC):
 
     `controllers`: the records of `[controller]`, one for each `model`; the exact path
     (`PathController`) is always possible. `dialect`: the record of `[dialect]`; writer and reader
-    find it in `machine.dialect`. `link`: the record of `[link]`, with keys of its own line.
-    """
+    find it in `machine.dialect`. `link`: the record of `[link]`, with keys of its own line."""
 
     name: ClassVar[str]
     controllers: ClassVar[tuple[type[SlideStart], ...]] = ()

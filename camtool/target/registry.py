@@ -6,8 +6,7 @@ A third party adds a target as camtool adds its own: by an entry point of the gr
 target that is asked for is imported. A broken plug-in is reported by name and harms no other.
 
 A folder `machines/` beside a target's `machine.toml` has further machines: files as a user's, each
-of which extends a target, or another one of them, and is known by its own name.
-"""
+of which extends a target, or another one of them, and is known by its own name."""
 
 from __future__ import annotations
 
@@ -108,8 +107,7 @@ class LoadedTarget(FrozenRecord):
         chunks.
 
         Rows after the end of the program are not run. Raises OptionError, MachineError, and
-        ProgramError, which names the block (some only when that row is run).
-        """
+        ProgramError, which names the block (some only when that row is run)."""
         from camtool.simulation.motion import Options
 
         options = options or Options()
@@ -183,8 +181,7 @@ class LoadedTarget(FrozenRecord):
         """Return (key, value, the target's own value) for all values that differ from the target's
         own file, as `--set` takes them.
 
-        Keys of `needs` always differ: the target's own value is then `not said`.
-        """
+        Keys of `needs` always differ: the target's own value is then `not said`."""
         import json
 
         values = dict(_flat("", self.values()))
@@ -261,8 +258,7 @@ def load_target(
 ) -> LoadedTarget:
     """Return the target `name`, with the values of a user's machine file and of `--set`.
 
-    Raises UnknownTargetError (with the nearest names) and MachineError.
-    """
+    Raises UnknownTargetError (with the nearest names) and MachineError."""
     user = None if machine_file is None else (read_table(machine_file), str(machine_file))
     return loaded_target(name, user, settings)
 

@@ -4,8 +4,7 @@ A target that has steps returns a `SignalModel` from `Target.signals`; any other
 which says why. Lines are bits of ports, bytes that the controller writes; two kinds of motors:
 
     Coils           the controller switches the coils itself, by a cyclic sequence of states
-    StepDirection   a driver has a line for steps and one for the direction
-"""
+    StepDirection   a driver has a line for steps and one for the direction"""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 
 A `Terminal` is a value like a conversation: typed lines go in and bytes come out, bytes that were
 heard go in and sentences come out. It opens nothing; `camtool console` joins it to a port. What it
-says of an answer stands behind the answer itself, never in its place.
-"""
+says of an answer stands behind the answer itself, never in its place."""
 
 from __future__ import annotations
 

@@ -11,8 +11,7 @@ in memory and `camtool twin` is a thin host around it.
 
 Time is in seconds of the machine and never goes back. What the machine executed stands in
 `decoded`, what its slides did in `slides.trace`, both comparable with what its target reads and
-simulates; `is_moving` says whether anything moves now.
-"""
+simulates; `is_moving` says whether anything moves now."""
 
 from __future__ import annotations
 

@@ -14,8 +14,7 @@ a port.
 
 Three counts of packets say where it stands: those that were `sent`, those that the controller has
 `acknowledged` (or that are taken for acknowledged, where it says nothing), and those that are
-`done`: what is cut for certain. After a crash a program goes on behind what is done.
-"""
+`done`: what is cut for certain. After a crash a program goes on behind what is done."""
 
 from __future__ import annotations
 
@@ -87,8 +86,7 @@ class Packet(Struct, frozen=True):
     number of reports that the controller gives of it, if it reports. `ask`: what the user must do
     or allow before it is sent. `note`: what the user must know while the machine waits in it;
     `waits`: the program waits there until somebody resumes it. `end_mm`: its end in the work
-    frame, if the conversation checks that.
-    """
+    frame, if the conversation checks that."""
 
     data: bytes
     block: int = -1
@@ -369,8 +367,7 @@ class Conversation(ABC):
 class PacketByPacket(Conversation):
     """A conversation that sends a packet when the one before is done.
 
-    It pauses between packets, and also stops there unless `_halt` can do more.
-    """
+    It pauses between packets, and also stops there unless `_halt` can do more."""
 
     stands = "stopped: it has done what it was sent, and stands"
     """Sentence for the user when the machine has stopped behind a packet."""
@@ -501,8 +498,7 @@ class Hand(Conversation):
     It is READY between orders, SENDING while one is carried out, and READY again when the machine
     stands; an order that the controller refuses is told, and changes nothing. `stop` stops the
     machine and ends the conversation, as everywhere; `close` ends it while the machine stands.
-    `says`: the state that the controller reports, in its own word; "" where it reports none.
-    """
+    `says`: the state that the controller reports, in its own word; "" where it reports none."""
 
     says = ""
     is_homed = False
@@ -555,8 +551,7 @@ class CommandHand(Hand):
     """A machine moved by the commands of its wire: each order is a conversation of its own.
 
     If the controller reports no place, the place is that at the begin of the session, plus the
-    steps counted or the distances of the orders carried out since.
-    """
+    steps counted or the distances of the orders carried out since."""
 
     def __init__(self, wire: Wire, machine: Machine[Any, Any], manner: Manner) -> None:
         super().__init__((), manner)
@@ -836,11 +831,7 @@ class Wire(ABC):
         home first (`manner`) and the machine has no command for that."""
 
     def command(
-        self,
-        action: str,
-        machine: Machine[Any, Any],
-        values: Mapping[str, float],
-        manner: Manner,
+        self, action: str, machine: Machine[Any, Any], values: Mapping[str, float], manner: Manner
     ) -> Conversation:
         """Return the conversation that homes, zeroes, jogs or unlocks the machine; `values` are
         those of axes ("x", "y", "z", mm) and the "feed" (mm/min). MachineError if the controller

@@ -81,8 +81,7 @@ class VerifyOptions(Struct, frozen=True):
     dialect may leave the wanted path on purpose. `trace_points`: points of the slides' path for
     pictures. `worst`: number of moves listed as those with the largest errors. `shape`: the part
     that comes out is compared with the one that is wanted, if the tool is known. `keep_ledger`:
-    keep time, steps and reversals of each row.
-    """
+    keep time, steps and reversals of each row."""
 
     interpolator: str | None = None
     effects: Effects = ALL
@@ -109,8 +108,7 @@ class Case(Struct, frozen=True, eq=False):
     mechanics. `asked`: what else the job asks for, as a program of the dialect. `written_from`:
     the moves from which the program was written, whose contours it must cut in the same direction;
     `row_from` (N,): the row of these from which each decoded row was written, −1 for none.
-    `registration`: the parts of the drawing that a program of others cuts.
-    """
+    `registration`: the parts of the drawing that a program of others cuts."""
 
     decoded: Toolpath
     target: LoadedTarget

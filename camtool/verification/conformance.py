@@ -8,8 +8,7 @@ A move that is in both with the same numbers conforms. Every other decoded move 
 the resolution of the dialect. What the dialect makes of the wanted path (chords, ends on its grid,
 stairs) is in `written` already, so the tolerance does not allow for it. The order of contours and
 their starts are free. Where moves of both lie on each other, their direction, feed, spindle, tool
-and coolant must be the same.
-"""
+and coolant must be the same."""
 
 from __future__ import annotations
 
@@ -133,8 +132,7 @@ class ProgramRequest(Struct, frozen=True, eq=False):
     `wanted`: the moves from which that is written. `unit_mm`, `unit_z_mm`: the resolution of the
     dialect in XY and in Z. `feed_named` (M,): the written rows whose feed the job names; feeds are
     equal within half of `feed_unit_mm_min`. `safe_z_mm`: the height of rapids; `safe_z_named`:
-    the job names it.
-    """
+    the job names it."""
 
     written: Toolpath
     wanted: Toolpath
@@ -516,8 +514,7 @@ def _feed_findings(setting_pairs: _SettingPairs, request: ProgramRequest) -> Ite
     On a machine that applies the feed to its faster axis, the speed along a line is higher by the
     ratio of its length to its run on that axis. A coarse grid changes the direction of short
     lines: the difference that follows from the directions is allowed, and twice the rounding, as
-    both feeds are rounded.
-    """
+    both feeds are rounded."""
     decoded_feed, written_feed = (
         setting_pairs.decoded.feed[setting_pairs.pairs[:, 0]],
         setting_pairs.written.feed[setting_pairs.pairs[:, 1]],
@@ -635,10 +632,7 @@ def _coolant_findings(setting_pairs: _SettingPairs) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS for cuts with other coolant than in the written program."""
     for is_asked, where, coolant, written, moves in _unequal_settings(setting_pairs, 3):
         yield (SETTING_DIFFERS_COOLANT if is_asked else SETTING_DIFFERS_COOLANT_UNASKED)(
-            where=where,
-            moves=moves,
-            coolant=COOLANTS[int(coolant)],
-            wanted=COOLANTS[int(written)],
+            where=where, moves=moves, coolant=COOLANTS[int(coolant)], wanted=COOLANTS[int(written)]
         )
 
 

@@ -7,8 +7,7 @@ of the bin with the sample of that rank. Bins (`camtool.kernels.judging`) are be
 1/128 of their value wide, so the percentile is within 0.4 % of the exact value.
 
 `RowFigures` takes the figures of the rows block by block, and keeps what is needed of them: the
-figures of contours, the worst moves, and sums of the whole motion (`Tally`).
-"""
+figures of contours, the worst moves, and sums of the whole motion (`Tally`)."""
 
 from __future__ import annotations
 
@@ -183,8 +182,7 @@ class RowFigures:
     Kept of each row: `seconds` (N,) and `total` (N,) mm, its largest total error, NaN where none
     is known. `inner`, `lag` and `whole` are the figures of interpolation, mechanics and total;
     `lines_mm` and `arcs_mm` the largest errors of interpolation, NaN without any; `mean_mm` the
-    signed mean of all total errors, + to the left of the wanted moves.
-    """
+    signed mean of all total errors, + to the left of the wanted moves."""
 
     def __init__(
         self,

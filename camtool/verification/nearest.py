@@ -8,8 +8,7 @@ Distances are exact: to true lines and arcs, never to chords.
                decide.
 
 `camtool.kernels.near` finds the moves within a limit of each point. Where no limit is given, it
-grows until a move is found: what is nearest within a limit is nearest of all.
-"""
+grows until a move is found: what is nearest within a limit is nearest of all."""
 
 from __future__ import annotations
 
@@ -63,11 +62,7 @@ class MoveIndex:
         return moves_of(self.cuts.segments, self.cuts.ends_z)
 
     def nearest(
-        self,
-        points: Floats,
-        height: Floats,
-        choice: Ints | None,
-        limits_mm: tuple[float, float],
+        self, points: Floats, height: Floats, choice: Ints | None, limits_mm: tuple[float, float]
     ) -> NearestMoves:
         """Return the nearest move to each of points (J, 2) at heights (J,), mm: within the first
         limit in XY, and within the second in height at its nearest place (more on slopes, where a
@@ -129,8 +124,7 @@ class MoveIndex:
 
         Returns (R, 4), a row for each group: its first point and the end of its points, the first
         move and the end of the moves of that contour. Without `choice`, all `count` points are one
-        group, which is compared with all moves.
-        """
+        group, which is compared with all moves."""
         if choice is None:
             return np.array([[0, count, 0, len(self.cuts.segments)]])
         offsets = run_offsets(choice, max(count, 1))

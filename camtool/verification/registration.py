@@ -12,8 +12,7 @@ line than its radius would leave stock there, and one that comes nearer would cu
 the distance to the *nearest* line is the radius, however many lines there are.
 
 Registration knows translations only. Where these do not do, the commonest other differences
-(inches for millimetres, a mirror, a quarter turn) are tried and named, never applied.
-"""
+(inches for millimetres, a mirror, a quarter turn) are tried and named, never applied."""
 
 from __future__ import annotations
 
@@ -208,8 +207,7 @@ class _Lines(Struct, frozen=True, eq=False):
         segment.
 
         Measured from the start of a segment of curvature k, with the point at x along the tangent
-        and y along the left normal, the foot is atan2(k x, 1 − k y) / k along.
-        """
+        and y along the left normal, the foot is atan2(k x, 1 − k y) / k along."""
         segment = nearest(points, self.segments).segment
         frames = self.frames[segment]
         q, k = points - frames.start, frames.curvature
@@ -325,8 +323,7 @@ def register(
 
     `tool_diameter_mm`: the tool, None if it is to be found; `align`: the drawing may lie
     elsewhere, and its place is searched for. `limit_mm`: how far moves may be from a track without
-    a finding. DrawingError for a drawing without lines.
-    """
+    a finding. DrawingError for a drawing without lines."""
     if not len(drawing.paths.vertices):
         raise DrawingError(
             "holds single points alone, and no line that a program could follow",
@@ -646,8 +643,7 @@ def _tracks_of(lines: Polylines, radius_mm: float, contours: Ints) -> _Tracks:
     for a radius of 0.
 
     Closed contours have round and sharp corners outside; an open one has one track that goes round
-    it.
-    """
+    it."""
     if radius_mm == 0.0:
         zeros = np.zeros(len(contours), dtype=np.int64)
         return _Tracks(lines.select(contours), contours, zeros, zeros.astype(np.bool_))
@@ -1263,8 +1259,7 @@ def _splice_tracks(
     """Return the program with the moves along the tracks in place of the rows that follow them.
 
     Chain k replaces the rows from chains[0][k] to chains[1][k], and runs along the track track[k].
-    What leads to a chain ends where it begins, and what follows it begins where it ends.
-    """
+    What leads to a chain ends where it begins, and what follows it begins where it ends."""
     toolpath, (vertices, runs, moves) = follower.cuts.toolpath, built
     begins, finishes = chains
     end = toolpath.end.copy()

@@ -7,8 +7,7 @@ resolution of any machine, so that the same job gives the same bytes on every co
     records ─▶ Report ─▶ limits of a pipeline (`Gates`)
                   ├────▶ `summary_lines`, lines for a terminal and for the margin of a picture
                   └────▶ `sheets`, tables of text ─▶ `ReportPage` ─▶ `page_markdown`, `page_html`,
-                                                          `page_json`
-"""
+                                                          `page_json`"""
 
 from __future__ import annotations
 
@@ -166,8 +165,7 @@ class CircleReport(msgspec.Struct, frozen=True):
     circle in several passes, or at the end of a helix, is reported once: its deepest level turn.
     `step_um` and `spike_um` at 0°, 90°, 180° and 270°, where X, Y, X and Y reverse, and B, the
     reversal values of X and Y: see `camtool.verification.circles`. All refer to the programmed
-    circle; `fit_um`: the largest distance of the drawing from it.
-    """
+    circle; `fit_um`: the largest distance of the drawing from it."""
 
     centre_mm: tuple[float, float]
     radius_mm: float
@@ -306,8 +304,7 @@ class InspectedReport(msgspec.Struct, frozen=True):
     it must be to be surely in. `probability`: that it is within the limits; if something is
     unknown, the value least in favour of the verdict. `verdict`: "in", "out", "undecided", or
     "predicted" without limits. `unknown`: keys of [uncertainty] that matter and are not given;
-    `measure`: what to measure next, "" for nothing.
-    """
+    `measure`: what to measure next, "" for nothing."""
 
     name: str
     kind: str
@@ -360,8 +357,7 @@ class PlannedOperation(msgspec.Struct, frozen=True):
     tooth and the cutting speed are None if the flutes, or the speed, are not known, and so is the
     predicted time. Their limits are those of the tool or its preset, (least, greatest or None),
     None if not given. `leaves_mm`: what stays on the walls for a later cut; `tabs`: the number of
-    tabs that it leaves.
-    """
+    tabs that it leaves."""
 
     name: str
     kind: str
@@ -420,8 +416,7 @@ class Planned(msgspec.Struct, frozen=True):
     and holders pass over at any height. `touch_mm`: for each tool that is mounted during the
     program, a place (x, y), mm, where the top of the stock is not cut yet, None if there is none.
     `setup`: text on the set-up that this is; `pins_mm`: its alignment pins; `flip_error_mm`: how
-    far its cuts may lie beside those of the other face, None if not known.
-    """
+    far its cuts may lie beside those of the other face, None if not known."""
 
     rapid_drawn_mm: float
     rapid_mm: float
@@ -1036,8 +1031,7 @@ def shorten(words: str) -> str:
 def page_json(page: ReportPage) -> str:
     """Return indented JSON with the report's keys after `title`, `verdict` and `setup`.
 
-    If the program could not be judged, only `findings` follow these.
-    """
+    If the program could not be judged, only `findings` follow these."""
     body: dict[str, Any] = {"title": page.title, "verdict": page.verdict}
     body["setup"] = None if page.setup is None else asdict(page.setup)
     if page.report is not None:

@@ -3,8 +3,7 @@
 The compiled judge (`camtool.kernels.judging`) takes the samples, from chunks or from a controller
 that is judged as it is simulated, and fills columns of the rows; this module sets its task and
 reads the results. A circle is evaluated when its last row is done, so that only circles in
-progress have bins. Memory grows with the rows of the program, not with the steps.
-"""
+progress have bins. Memory grows with the rows of the program, not with the steps."""
 
 from __future__ import annotations
 

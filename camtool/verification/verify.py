@@ -7,8 +7,7 @@
     all of it ─▶ Report and Trace
 
 Every distance is to true lines and arcs. Memory grows with the rows of the program, not with the
-steps of the machine.
-"""
+steps of the machine."""
 
 from __future__ import annotations
 
@@ -34,18 +33,8 @@ from camtool.verification.case import SAMPLE_MM, TRACE_POINTS, Case, VerifyOptio
 from camtool.verification.circles import NO_FIGURES, full_circles
 from camtool.verification.coverage import Coverage, Side, cover, direction_findings
 from camtool.verification.cuts import CutMoves, is_flat, loops, row_lengths
-from camtool.verification.dimensions import (
-    LoopedCuts,
-    SlideExtents,
-    sizes,
-)
-from camtool.verification.figures import (
-    Figure,
-    RowFigures,
-    Tally,
-    contour_names,
-    tally_of,
-)
+from camtool.verification.dimensions import LoopedCuts, SlideExtents, sizes
+from camtool.verification.figures import Figure, RowFigures, Tally, contour_names, tally_of
 from camtool.verification.matching import Goal, match_through_compensation, own_match
 from camtool.verification.motion_findings import motion_findings
 from camtool.verification.report import (
@@ -108,8 +97,7 @@ class Verification:
 def verify(case: Case, progress: Progress | None = None) -> Verification:
     """Simulate the program of a case and judge it against the wanted moves, if there are any.
 
-    `progress` is told how many rows are judged. Raises what `LoadedTarget.simulate` raises.
-    """
+    `progress` is told how many rows are judged. Raises what `LoadedTarget.simulate` raises."""
     decoded, target, options = case.decoded, case.target, case.simulation
     target.check_options(options)
     fused = target.model.fused_run(decoded, target.machine, options)
@@ -164,9 +152,7 @@ def judge(
     )
 
 
-def compare_cuts(
-    case: Case,
-) -> tuple[Paths, Coverage, Conformance | None, tuple[Finding, ...]]:
+def compare_cuts(case: Case) -> tuple[Paths, Coverage, Conformance | None, tuple[Finding, ...]]:
     """Compare the decoded with the wanted cuts. Return the paths by which the slides are judged,
     the coverage, the conformance (None if nothing else is asked of the program), and CUT_OTHER_WAY
     findings. The search tables are freed on return."""
@@ -492,8 +478,7 @@ def _depth_error_mm(case: Case, cuts: CutMoves) -> float:
     the ends of rows that cut; NaN if none does.
 
     Within a row Z does not reverse, and it ends where the program says, so its error follows from
-    the ends of the rows alone, whatever the controller does between them.
-    """
+    the ends of the rows alone, whatever the controller does between them."""
     toolpath = cuts.toolpath
     if not cuts.is_cut.any():
         return math.nan

@@ -1,8 +1,7 @@
 """Quantities over time reduced to the columns of a picture: the least and largest value in each.
 
 Memory is that of the columns, however long the program is, and no peak is lost: a value that holds
-for any part of a column counts in it.
-"""
+for any part of a column counts in it."""
 
 from __future__ import annotations
 
@@ -106,8 +105,7 @@ class Speeds:
     columns.
 
     Each speed is averaged over `samples` samples of a row, or over at least `period_s` of motion
-    (0: none); where the machine stands between two samples, it is 0.
-    """
+    (0: none); where the machine stands between two samples, it is 0."""
 
     def __init__(
         self, columns: TimeColumns, start_mm: Floats, samples: int, period_s: float = 0.0

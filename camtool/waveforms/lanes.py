@@ -1,8 +1,7 @@
 """A picture of quantities over time: lanes one below the other, with one axis of time.
 
 Each curve is the band between the least and the largest value of its columns (`columns`), so that
-a picture is never larger than its width, and every peak is in it.
-"""
+a picture is never larger than its width, and every peak is in it."""
 
 from __future__ import annotations
 

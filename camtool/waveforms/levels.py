@@ -1,8 +1,7 @@
 """The levels of all lines of a controller over time, from the pulses of its motors.
 
 A row is a moment at which a line changes: the bytes of all ports and the positions of all motors
-from then on. Pulses within one tick are one row.
-"""
+from then on. Pulses within one tick are one row."""
 
 from __future__ import annotations
 

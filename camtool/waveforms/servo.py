@@ -2,8 +2,7 @@
 along the path; as a picture, as a table of ticks, and as figures of each order.
 
 A stream of ticks is read once; what a picture needs of it are columns, and figures need one order
-at a time, so memory does not grow with the program but for a record of each order.
-"""
+at a time, so memory does not grow with the program but for a record of each order."""
 
 from __future__ import annotations
 
@@ -229,11 +228,7 @@ class StepAnswer(Struct, frozen=True, eq=False):
 
 
 def steps_picture(
-    name: str,
-    title: str,
-    answers: Sequence[StepAnswer],
-    tick_s: float,
-    options: PictureOptions,
+    name: str, title: str, answers: Sequence[StepAnswer], tick_s: float, options: PictureOptions
 ) -> bytes:
     """Return the picture of `steps_svg` for a file of this name, .svg or .png."""
     return rendered(lambda sized: steps_svg(title, answers, tick_s, sized), name, options)

@@ -1,7 +1,6 @@
 """The signals of a program on its machine: levels of a stretch, dumps, tables and pictures.
 
-Everything is made anew by each call, in chunks: memory does not grow with the program.
-"""
+Everything is made anew by each call, in chunks: memory does not grow with the program."""
 
 from __future__ import annotations
 

@@ -44,8 +44,7 @@ def engrave(chosen: Chosen, setting: Setting) -> Work:
     """Return a contour for each path, as it is drawn.
 
     OptionError for a direction other than "drawn": climb and conventional refer to a wall, and a
-    groove has two.
-    """
+    groove has two."""
     operation = setting.operation
     if operation.direction != "drawn":
         raise OptionError(

@@ -11,8 +11,7 @@ wants it. "conventional" is the opposite; "drawn" is climb too, because no ring 
 The tool goes down once for each connected tool centre region, and stays at depth between rings:
 links run within that region, so they cut nothing that is to stay. At each level it goes down from
 the floor of the level before (at first from the stock's top), follows the path, and comes back
-over the new floor to where it goes down again.
-"""
+over the new floor to where it goes down again."""
 
 from __future__ import annotations
 
@@ -121,8 +120,7 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
     """Return one item for each region that the closed paths enclose (even-odd), and findings about
     what stays uncut.
 
-    OptionError for an open path, for paths that cross, and for a tool that cuts no width.
-    """
+    OptionError for an open path, for paths that cross, and for a tool that cuts no width."""
     _check(chosen, setting.operation)
     if setting.operation.stage == "finish":
         return _walls(chosen, setting)
@@ -233,8 +231,7 @@ def _tool_regions(region: Polylines, setting: Setting) -> list[Polylines]:
 
     A disc of radius r reaches into what one of radius R does not cover where its centre is in the
     region shrunk by r, and not in what a disc of radius R − r covers of that: for what R covers,
-    shrunk by r, is what R − r covers of the region shrunk by r.
-    """
+    shrunk by r, is what R − r covers of the region shrunk by r."""
     operation = setting.operation
     region = _without_lost_islands(region, operation.beyond_mm)
     tool_region = offset_shape(region, operation.tool.radius_mm + left_beside_mm(setting))
@@ -251,8 +248,7 @@ def _without_lost_islands(region: Polylines, beyond_mm: float) -> Polylines:
     """Return the region without the islands that a cut beyond the lines takes away wholly.
 
     The tool need not go round them: between such an island and the wall it would leave material.
-    The larger ones are an error of the job (`cut_away_findings`).
-    """
+    The larger ones are an error of the job (`cut_away_findings`)."""
     if not beyond_mm:
         return region
     islands = region.select(range(1, len(region)))

@@ -6,8 +6,7 @@ The band are the places of the tool's centre that are not farther from a wall th
 wider than the tool. So bands of neighbours merge, and holes that are narrower are cleared wholly.
 Circles run along the middle of the band (`camtool.planning.trochoids`); the cusps that they leave
 at the wall are cleared, those on the other side stay. A pass along the wall comes last. On lines
-the band lies on both sides, and is cleared to its edges.
-"""
+the band lies on both sides, and is cleared to its edges."""
 
 from __future__ import annotations
 

@@ -433,8 +433,7 @@ def pruned(graph: Graph, tolerance_mm: float) -> Graph:
     farther than the tolerance out of the disc at the other end of the branch.
 
     A disc (m, ρ) reaches |m − m'| + ρ − ρ' out of another one (m', ρ'); along a branch of several
-    pieces these add up at most.
-    """
+    pieces these add up at most."""
     degree = np.bincount(graph.ends.ravel(), minlength=len(graph.places))
     reach = np.zeros(len(graph.places))
     is_kept: Bools = np.ones(len(graph.pieces), dtype=np.bool_)
