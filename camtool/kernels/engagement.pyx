@@ -120,7 +120,9 @@ cdef class Cleared:
     def __init__(
         self, extents: Floats, reach_mm: float, box: Floats, *, from_right: bool = False
     ) -> None:
-        """`extents` (2, 2): least and greatest place of tools; `reach_mm`: the radius of the
+        """Begin without moves.
+
+        `extents` (2, 2): least and greatest place of tools; `reach_mm`: the radius of the
         widest tool; `box` (4,): low x, low y, high x, high y of the stock, outside of which
         nothing is cut (infinite: not known); `from_right`: angles are those from the right end of
         the front half to the farthest place in the stock, with all that is air between."""
@@ -490,9 +492,10 @@ cdef void _remember(Cleared self, Int row) noexcept nogil:
 
 
 cdef bint _may_clear(Cut* other, double wide, Front* front, Window* window) noexcept nogil:
-    """True if a move may have cleared an open place of a piece. It has cleared the first or the
-    last one, or else it comes nearest to the circle between them, and then it cannot lie on the
-    outer side of either."""
+    """Return True if a move may have cleared an open place of a piece.
+
+    A move that has, has cleared the first or the last open place, or else it comes nearest to the
+    circle between these two, and then it cannot lie on the outer side of either."""
     cdef double ax = other.ax - front.x, ay = other.ay - front.y
     cdef double bx = other.bx - front.x, by = other.by - front.y
     cdef double ux = window.first_x - front.x, uy = window.first_y - front.y
@@ -509,7 +512,7 @@ cdef bint _may_clear(Cut* other, double wide, Front* front, Window* window) noex
 
 
 cdef inline bint _is_nearer(double x, double y, double far, Cut* other) noexcept nogil:
-    """True if a point is nearer to a move than a distance."""
+    """Return True if a point is nearer to a move than a distance."""
     cdef double px = x - other.ax, py = y - other.ay
     cdef double along = px * other.ux + py * other.uy, across = py * other.ux - px * other.uy
     if along < 0.0 or other.length == 0.0:
