@@ -1,4 +1,4 @@
-"""What the pages show is run, and gives what they show.
+"""What the pages and docstrings show is run, and gives what they show.
 
 On each page, in order, in one temporary folder with the samples in it:
 
@@ -11,6 +11,8 @@ what comes out into the pages.
 """
 
 import contextlib
+import doctest
+import importlib
 import io
 import os
 import re
@@ -144,3 +146,17 @@ def test_what_is_wrong_is_seen(tmp_path: Path) -> None:
     dots = "```console\n$ seq 4\n1\n...\n4\n```\n"
     assert run_page(dots, tmp_path) == dots
     assert run_page(dots.replace("\n4\n", "\n5\n"), tmp_path) != dots
+
+
+def modules_with_examples() -> list[str]:
+    """Return the dotted names of the modules whose docstrings show examples."""
+    files = [*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/**/*.py")]
+    shown = [path for path in files if ">>> " in path.read_text(encoding="utf-8")]
+    return sorted(".".join(path.relative_to(ROOT).with_suffix("").parts) for path in shown)
+
+
+@pytest.mark.parametrize("name", modules_with_examples())
+def test_docstrings_show_what_comes_out(name: str) -> None:
+    result = doctest.testmod(importlib.import_module(name))
+    assert result.attempted
+    assert not result.failed
