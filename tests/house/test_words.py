@@ -31,7 +31,7 @@ CYTHON_DOCSTRING = re.compile(
 CYTHON_FUNCTION = re.compile(r" {0,4}(?:def|cdef|cpdef) (?!class|enum)[^=]*?(\w+)\(")
 CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILINE)
 
-MAX_WITHOUT_VERB = 1
+MAX_WITHOUT_VERB = 0
 MAX_SHARED_CLASS_NAMES = 0
 MAX_SUPERLATIVES = 0
 MAX_RIDDLES = 0
