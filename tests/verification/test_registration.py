@@ -174,7 +174,7 @@ def test_a_program_that_lies_elsewhere_is_not_guessed_at() -> None:
 def test_scale_mirror_and_turn_are_named(
     matrix: tuple[tuple[float, float], tuple[float, float]], flag: str
 ) -> None:
-    result = found(Made(matrix=matrix, shift=(2.0, 5.0)))
+    result = found(Made(passes=(-3.0,), order=(0, 4, 5, 6), matrix=matrix, shift=(2.0, 5.0)))
     assert codes(result) == {VerificationCode.DRAWING_PLACE: Severity.ERROR}
     assert flag in result.findings[0].message
 
