@@ -205,14 +205,16 @@ cdef class Cleared:
         number = rows.shape[0]
         for i in range(rows.shape[0]):
             _go_to(self, &rows[i, 0])
-            bound = _greatest(
-                self, &rows[i, 0], thick, limit, INFINITY, coarse,
-                greatest if coarse < INFINITY else limit,
-            )
-            greatest = max(greatest, bound)
+            bound = _greatest(self, &rows[i, 0], thick, limit, INFINITY, INFINITY, limit)
             if bound > limit:
                 number, share = i, _first_above(self, &rows[i, 0], thick, limit)
+                greatest = bound
                 break
+            if coarse < INFINITY and bound > greatest:
+                bound = min(bound, _greatest(
+                    self, &rows[i, 0], thick, limit, INFINITY, coarse, greatest
+                ))
+            greatest = max(greatest, bound)
             _add(self, &rows[i, 0])
         _forget(self, count, used)
         self.x, self.y, self.travelled = x, y, travelled
@@ -336,8 +338,9 @@ cdef double _greatest(
 
 
 cdef double _first_above(Cleared self, double* move, double thick, double limit) noexcept nogil:
-    """Return the part of a move before its first stretch whose engagement may exceed a limit."""
-    cdef double length = math.hypot(move[BX] - move[AX], move[BY] - move[AY]), low, high, half
+    """Return the part of a move before its first place whose engagement may exceed a limit."""
+    cdef double length = math.hypot(move[BX] - move[AX], move[BY] - move[AY])
+    cdef double low, high, half, first = length
     cdef double ends[WAITING]
     cdef int waiting = 1
     if length == 0.0:
@@ -349,11 +352,14 @@ cdef double _first_above(Cleared self, double* move, double thick, double limit)
         if _open_angle(self, move, length, low, high, thick - half, thick) <= limit:
             waiting, low = waiting - 1, high
         elif half <= FINEST * thick or waiting == WAITING:
-            break
+            return low / length
+        elif _open_angle(self, move, length, low, high, thick, thick) > limit:
+            # It is exceeded in the middle: what lies behind does not matter.
+            waiting, first, ends[0] = 1, low + half, low + half
         else:
             ends[waiting] = low + half
             waiting += 1
-    return low / length
+    return first / length
 
 
 cdef double _all_round(Cleared self, double* move, double thick) noexcept nogil:

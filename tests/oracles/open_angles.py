@@ -104,14 +104,16 @@ class Cleared:
         self.cuts = self.cuts.copy()
         for number, move in enumerate(moves.tolist()):
             self._go_to(move)
-            least = greatest if coarse_rad < math.inf else limit
-            bound = self._greatest(move, thick, limit, math.inf, coarse_rad, least)
-            greatest = max(greatest, bound)
+            bound = self._greatest(move, thick, limit, math.inf, math.inf, limit)
             if bound > limit:
                 length = hypot(move[2] - move[0], move[3] - move[1])
-                low = self._first_above(move, length, (0.0, length), thick, limit)
-                place = number, (low or 0.0) / (length or 1.0)
+                first = self._first_above(move, length, (0.0, length), thick, limit)
+                greatest, place = bound, (number, (first or 0.0) / (length or 1.0))
                 break
+            if coarse_rad < math.inf and bound > greatest:
+                near = self._greatest(move, thick, limit, math.inf, coarse_rad, greatest)
+                bound = min(bound, near)
+            greatest = max(greatest, bound)
             self._add(move)
         self.__dict__.update(before)
         return greatest, *place
@@ -124,7 +126,8 @@ class Cleared:
         thick: float,
         limit: float,
     ) -> float | None:
-        """The beginning of the first stretch that cannot be halved and may exceed a limit."""
+        """Return the first place of a stretch that may exceed a limit: where one begins that
+        cannot be halved, or the middle of one."""
         low, high = stretch
         half = 0.5 * (high - low)
         if length > 0.0:
@@ -133,9 +136,12 @@ class Cleared:
                 return None
         if half <= FINEST * thick:
             return low
+        is_above = self.open_angle(move, length, low, high, thick, thick) > limit
         first = self._first_above(move, length, (low, low + half), thick, limit)
         if first is not None:
             return first
+        if is_above:
+            return low + half
         return self._first_above(move, length, (low + half, high), thick, limit)
 
     def _all_round(self, move: list[float], thick: float) -> float:
