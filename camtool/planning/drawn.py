@@ -31,7 +31,7 @@ from camtool.geometry.boxes import moves_of, nearest_pairs
 from camtool.geometry.measure import extents, path_extents
 from camtool.geometry.polylines import Polylines, Segments, reverse, segment_rows
 from camtool.planning.items import Contour, Runs, Setting, Step, contours_of
-from camtool.planning.job import Operation, Tool
+from camtool.planning.job import Operation, Stock, Tool
 from camtool.planning.sides import regions_of, runs_beside
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.wanted import NO_EDGE, DrawnEdges, ProtectedRegion
@@ -59,9 +59,12 @@ SAME_SIZE_MM = 1e-3
 round that line alone."""
 
 
-def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing) -> DrawnEdges:
+def drawn_of(
+    toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing, stock: Stock | None
+) -> DrawnEdges:
     """Return, for each row of a toolpath, what was drawn there. The rows belong to the runs (N,)
-    of the steps, counted through all steps; `placed`: the drawing in the work frame."""
+    of the steps, counted through all steps; `placed`: the drawing in the work frame, as the stock
+    is."""
     # A broadcast constant until a row has another value.
     off_mm = np.broadcast_to(0.0, (len(toolpath), 2))
     edge = np.broadcast_to(np.int64(NO_EDGE), len(toolpath))
@@ -89,7 +92,15 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
     nominal, boxes, followed, cleared = map(np.concatenate, zip(*columns, strict=True))
     line = np.concatenate(lines)
     return DrawnEdges(
-        off_mm, edge, nominal, boxes, line, followed, cleared, datum_off_mm=placed.datum_off_mm
+        off_mm,
+        edge,
+        nominal,
+        boxes,
+        line,
+        followed,
+        cleared,
+        datum_off_mm=placed.datum_off_mm,
+        stock_mm=None if stock is None else stock.box_mm,
     )
 
 

@@ -161,7 +161,7 @@ def _linked(
         made_from=made_from,
         setup=setup_heading(job),
         tabs_mm=_tabs(steps),
-        drawn=drawn_of(toolpath, builder.runs, steps, placed_drawing),
+        drawn=drawn_of(toolpath, builder.runs, steps, placed_drawing, job.stock),
     )
     return replace(plan, toolpath=toolpath)
 

@@ -28,7 +28,8 @@ class DrawnEdges(Struct, frozen=True, eq=False):
     line together. `followed` (E,): the tool's centre runs on the line, and the edges of the cut
     lie beside it; `cleared` (E,): the edge bounds all that the tool removes, not one closed pass
     beside it. `datum_off_mm`: the part of `off_mm` that comes from placing the drawing by a box,
-    the same for all rows."""
+    the same for all rows. `stock_mm`: the left, lower, right and upper edge of the stock, None
+    where they are not known; of a pocket that is open there, the part keeps no wall beyond."""
 
     off_mm: Floats
     edge: Ints
@@ -38,6 +39,7 @@ class DrawnEdges(Struct, frozen=True, eq=False):
     followed: Bools
     cleared: Bools
     datum_off_mm: float = 0.0
+    stock_mm: tuple[float, float, float, float] | None = None
 
     def picked(self, row: Ints) -> DrawnEdges:
         """Return the record for rows (M,) selected in the given order, with repetitions."""

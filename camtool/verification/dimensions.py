@@ -9,6 +9,9 @@ tool centre's path:
 
     predicted edge = planned edge + (box of the slides − box of the wanted moves)
 
+Where what is cleared reaches beyond the stock, as in a pocket that is open at its edge, sizes end
+where the stock does: the part keeps no wall there.
+
 Where the edges are not known, and of lines that a tool of some width follows with its centre,
 sizes are those of the tool centre's path.
 
@@ -204,6 +207,11 @@ def _edges(goal: LoopedCuts, centre: Floats, slide: Floats) -> _Edges:
             makes.all(axis=(1, 2))[:, None, None], drawn.nominal[numbers], drawn.planned[numbers]
         )
         listed[with_edge] = makes.any(axis=(1, 2)) | ~drawn.cleared[numbers]
+        if drawn.stock_mm is not None:
+            inner = with_edge[drawn.cleared[numbers]]
+            low, high = np.array(drawn.stock_mm).reshape(2, 2, 1)
+            for boxes in (nominal, predicted, own_boxes):
+                boxes[inner] = np.clip(boxes[inner], low, high)
     return _Edges(
         edge >= UNKNOWN_EDGE, nominal, predicted, rough, followed, cleared, own_boxes, listed
     )

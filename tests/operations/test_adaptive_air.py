@@ -210,3 +210,21 @@ def test_the_limit_is_proved_on_the_predicted_slides(case: str, target: str) -> 
     assert "ENGAGEMENT_KEPT" in names
     bad = {"ENGAGEMENT_TOO_HIGH", "MATERIAL_LEFT", "CUT_TOO_DEEP", "GOUGE", "RAPID_IN_STOCK"}
     assert not bad & names
+
+
+@pytest.mark.parametrize("strategy", ["adaptive", "passes"])
+def test_sizes_of_an_open_pocket_end_at_the_edge_of_the_stock(strategy: str) -> None:
+    """Of a pocket drawn beyond the stock, by what a tool does not reach, the part keeps 20 mm."""
+    own = OWN if strategy == "adaptive" else ()
+    operation = adaptive(spindle_rpm=9000.0, own=own)
+    document = ezdxf.new(units=ezdxf.units.MM)
+    document.modelspace().add_lwpolyline([(20, 5), (47.3, 5), (47.3, 25), (20, 25)], close=True)
+    run = camtool.post(document, "grbl", Job((operation,), stock=STOCK))
+    assert run.report is not None
+    sizes = {each.name: each for each in run.report.dimensions}
+    for name, nominal_mm in (("part X", 20.0), ("part Y", 20.0)):
+        assert sizes[name].nominal_mm == pytest.approx(nominal_mm)
+        assert sizes[name].predicted_mm == pytest.approx(nominal_mm, abs=0.01)
+    whole = camtool.post(document, "grbl", Job((operation,)))
+    assert whole.report is not None
+    assert whole.report.dimensions[0].nominal_mm == pytest.approx(27.3)
