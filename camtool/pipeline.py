@@ -837,7 +837,8 @@ def _before_figures(plain_run: Run | None) -> BaselineReport | None:
 
 
 def _judge_program(case: Case, data: bytes, progress: Progress) -> Verification:
-    """Simulate and judge the program of a case; `data` are its bytes."""
+    """Simulate the program `data` of a case (drawing, job and machine), and return its report and
+    findings."""
     from camtool.verification.verify import verify
 
     progress.begin("simulating and judging", len(case.decoded))

@@ -248,7 +248,7 @@ class MachineFlags(Struct, frozen=True):
 
 
 def machine_options(command: Command) -> Command:
-    """Add `machine: MachineFlags`."""
+    """Give a command the flags of the machine; it gets them as `machine: MachineFlags`."""
     options = [
         option(
             _MACHINE, "--target", "-t", metavar="NAME", help="The machine; see camtool targets."
@@ -317,7 +317,8 @@ class GateFlags(Struct, frozen=True):
 
 
 def gate_options(command: Command) -> Command:
-    """Add `gates: GateFlags`."""
+    """Give a command the flags that limit what a report may say (error, time …); beyond one the
+    command fails. It gets them as `gates: GateFlags`."""
     return with_flags(
         command,
         "gates",
@@ -409,7 +410,8 @@ DRAWING = "drawing"
 
 
 def inspection_options(command: Command) -> Command:
-    """Add `inspection: InspectionFlags`."""
+    """Give a command the flags of tolerances and uncertainty; it gets them as
+    `inspection: InspectionFlags`."""
     return with_flags(
         command,
         "inspection",
@@ -497,7 +499,7 @@ class DrawingFlags(Struct, frozen=True):
 
 
 def drawing_options(command: Command) -> Command:
-    """Add `drawing: DrawingFlags`."""
+    """Give a command the flags of reading a drawing; it gets them as `drawing: DrawingFlags`."""
 
     def options_type(**values: Any) -> DrawingFlags:
         named = ((name.removeprefix(_OF_READING), value) for name, value in values.items())
@@ -677,7 +679,7 @@ def own_tolerances(drawing: Path) -> Path | None:
 
 
 def job_options(command: Command) -> Command:
-    """Add `job: JobFlags`."""
+    """Give a command the flags of the job; it gets them as `job: JobFlags`."""
 
     def make_flags(
         job: str | None, operation: tuple[str, ...], setup: str | None, **keys: Any

@@ -696,8 +696,8 @@ def propagate(
 
 
 def _nodes(direction: Direction, standard: float, probe: float, extremes: bool) -> Floats:
-    """Return the ascending positions (J,) along a direction at which the machine is simulated, 0
-    among them; only 0 if nothing is uncertain."""
+    """Return the ascending offsets (J,) of an uncertain value of the machine for which it is
+    simulated, in the unit of the value, 0 among them; only 0 if the value is certain."""
     is_bent = direction.bends or (extremes and direction.distorts)
     step = (standard or probe) * (STEP_IN_BENDS if is_bent and standard else 1.0)
     if not step:

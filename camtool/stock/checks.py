@@ -472,8 +472,8 @@ class _Checks:
     def _tab(
         self, bridge: Bridge, width_mm: float, height_mm: float, depth_mm: float
     ) -> tuple[float, float]:
-        """Return the width over which a tab stands at its full height, and its height in its
-        middle above the floor of the cut, mm."""
+        """Measure a tab in the simulated stock: return the width, along the path, over which it
+        has its full height, and the height of its middle above the floor of the cut, mm."""
         half = 0.5 * width_mm
         step = half * np.arange(-MIN_CHORDS, MIN_CHORDS + 1) / MIN_CHORDS
         points = bridge.centre + step[:, None] * bridge.ahead

@@ -269,8 +269,11 @@ class ReportBuilder(Struct, frozen=True, eq=False):
         trace: SlideTrace,
         shape: WantedShape | None = None,
     ) -> Report:
-        """Return the report; `extents` (3, 2), mm, of the decoded toolpath, `trace` of the slides,
-        and the wanted `shape` if it is compared."""
+        """Return the report of the verification.
+
+        `extents` (3, 2): least and greatest X, Y, Z of the decoded toolpath, mm; `trace`: the
+        simulated positions of the slides; `shape`: the wanted shape, None if it is not compared.
+        """
         case, tally = self.case, self.tally
         options = case.options
         link_s = case.machine.link.seconds(options.line_bytes or 0, tally.time_s)

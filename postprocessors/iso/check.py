@@ -473,7 +473,7 @@ class _Check:
         return "".join(f"{line}{end}" for line in lines).encode()
 
     def _check_event(self, each: EventPattern) -> None:
-        """Refuse an event whose own blocks the reader takes for something else."""
+        """Refuse an event if its blocks in the machine file are read back as another event."""
         templates: tuple[str, ...] = getattr(self._dialect.events, each.key)
         if len(each.fields) != len(_FIELD.findall(" ".join(templates))):
             return  # the variant without a speed
