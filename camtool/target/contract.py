@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import msgspec
 from msgspec import Struct
@@ -37,14 +37,6 @@ if TYPE_CHECKING:
 
 class NoDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The `[dialect]` of a target without options of its own."""
-
-
-class TwinKind(NamedTuple):
-    """The virtual controllers of a target: the record of the choices that the sources of its wire
-    leave open (with our defaults), and the class that is made from a machine and this record."""
-
-    settings: type[Struct]
-    make: Callable[[Any, Any], Twin]
 
 
 NEAR_RATIO = 1e-6
@@ -84,13 +76,27 @@ class SampledDialect(Struct, frozen=True):
 def lazy_call(path: str) -> Any:
     """Return a method that calls the function or class at `path` ("package.module:name") with its
     own arguments; the module is imported at the first call, so that listing targets stays fast."""
-    module, _, name = path.partition(":")
 
     def call(self: Target, *arguments: Any, **named: Any) -> Any:
-        return getattr(import_module(module), name)(*arguments, **named)
+        return _named_by(path)(*arguments, **named)
 
     call.path = path  # type: ignore[attr-defined]
     return call
+
+
+def lazy_name(path: str) -> Any:
+    """Return a method that returns what is at `path`, as `lazy_call` calls it."""
+
+    def get(self: Target) -> Any:
+        return _named_by(path)
+
+    get.path = path  # type: ignore[attr-defined]
+    return get
+
+
+def _named_by(path: str) -> Any:
+    module, _, name = path.partition(":")
+    return getattr(import_module(module), name)
 
 
 class Target(ABC):
@@ -250,7 +256,7 @@ class Target(ABC):
         where a rest is impossible."""
         return None
 
-    def twin_kind(self) -> TwinKind:
-        """Return the virtual controllers of the target; MachineError, with the reason, if it has
-        none."""
+    def twin_kind(self) -> type[Twin]:
+        """Return the class of its virtual controllers, which are made from a machine and a record
+        of its `settings`; MachineError, which says why, for a target that has none."""
         raise MachineError(f"{self.name} has no virtual controller: {self.no_twin}")

@@ -149,7 +149,7 @@ class LoadedTarget(FrozenRecord):
                 where="table [controller], key model",
                 mend=f'leave model = "path" out: its own is {self.target.name}',
             )
-        kind = self.target.twin_kind()
+        kind: Any = self.target.twin_kind()
         given_choices = dict(choice.partition("=")[::2] for choice in choices)
         try:
             choices_made = msgspec.convert(given_choices, kind.settings, strict=False)
@@ -161,7 +161,8 @@ class LoadedTarget(FrozenRecord):
                 if listed
                 else "there is no choice",
             ) from None
-        return kind.make(self.machine, choices_made)
+        twin: Twin = kind(self.machine, choices_made)
+        return twin
 
     def with_settings(self, settings: Sequence[str]) -> LoadedTarget:
         """Return the target with further `key.key=value` settings; MachineError names a wrong

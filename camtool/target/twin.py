@@ -199,6 +199,8 @@ class Twin(ABC):
     """A virtual controller. A target overrides `_receive_byte`, which handles a byte, and, if the
     controller does more by itself than move, `wake_s` (when) and `_wake` (what)."""
 
+    settings: ClassVar[type[Struct]]
+    """The record of the choices that the sources of its wire leave open, with our defaults."""
     wire: ClassVar[str]
     """The settings of the line as terminal programs need them, such as "115200 8N1"."""
     byte_s: ClassVar[float] = 0.0

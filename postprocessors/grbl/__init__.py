@@ -6,7 +6,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Target, TwinKind, lazy_call
+from camtool.target.contract import Target, lazy_call, lazy_name
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
 from ..gcode.meanings import MEANINGS
@@ -39,6 +39,7 @@ class Grbl(Target):
     wire = lazy_call("camtool_postprocessors.grbl.wire:GrblWire")
     made_elsewhere = lazy_call("camtool_postprocessors.gcode.comments:lacks_heading")
     listing = lazy_call("camtool_postprocessors.gcode.blocks:listing")
+    twin_kind = lazy_name("camtool_postprocessors.grbl.twin:GrblTwin")
 
     def check(self, machine: GrblMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -49,12 +50,6 @@ class Grbl(Target):
     def unit_mm(self, machine: GrblMachine, axis: Axis) -> float:
         """Return the last decimal of a coordinate."""
         return last_decimal_mm(machine.dialect)
-
-    def twin_kind(self) -> TwinKind:
-        """Return the virtual controller; docs/wires/grbl.md."""
-        from .twin import GrblTwin, GrblTwinSettings
-
-        return TwinKind(GrblTwinSettings, GrblTwin)
 
 
 POST = Grbl()

@@ -517,6 +517,7 @@ class _Parser(GrblParser):
 class GrblTwin(Twin):
     """A virtual grbl that has just been switched on."""
 
+    settings = GrblTwinSettings
     wire = "115200 8N1"
     byte_s = 10.0 / 115200.0
 

@@ -5,7 +5,7 @@ docs/controllers/i8751.md what the controller does with it."""
 
 from __future__ import annotations
 
-from camtool.target.contract import Target, TwinKind, lazy_call
+from camtool.target.contract import Target, lazy_call, lazy_name
 
 from .dialect import I8751Controller, I8751Dialect, I8751Link, I8751Machine, check
 
@@ -24,6 +24,7 @@ class I8751(Target):
     signals = lazy_call("camtool_postprocessors.i8751.signals:I8751Signals")
     wire = lazy_call("camtool_postprocessors.i8751.wire:I8751Wire")
     listing = lazy_call("camtool_postprocessors.i8751.stream:listing")
+    twin_kind = lazy_name("camtool_postprocessors.i8751.twin:I8751Twin")
 
     def check(self, machine: I8751Machine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -33,12 +34,6 @@ class I8751(Target):
         """Return the greatest distance of the cut from the drawing that the two tolerances allow
         together, mm: records stray from their lines, and lines from their arcs."""
         return machine.dialect.tolerance_mm + machine.dialect.arc_tolerance_mm
-
-    def twin_kind(self) -> TwinKind:
-        """Return the virtual controller; docs/wires/i8751.md."""
-        from .twin import I8751Twin, I8751TwinSettings
-
-        return TwinKind(I8751TwinSettings, I8751Twin)
 
     def line_bytes(self, data: bytes, machine: I8751Machine) -> int:
         """Return the bytes of the packets that go over the line, whatever the form of the file."""

@@ -67,6 +67,7 @@ class I8751TwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True,
 class I8751Twin(Twin):
     """The controller after a reset, at rest."""
 
+    settings = I8751TwinSettings
     wire = "2400 8N1"
     byte_s = 10.0 / 2400.0
 

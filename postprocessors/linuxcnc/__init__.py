@@ -6,7 +6,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Target, TwinKind, lazy_call
+from camtool.target.contract import Target, lazy_call, lazy_name
 from camtool.target.signals import NoSignals
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
@@ -44,6 +44,7 @@ class Linuxcnc(Target):
     settings_from = lazy_call("camtool_postprocessors.linuxcnc.ini:settings_of")
     made_elsewhere = lazy_call("camtool_postprocessors.gcode.comments:lacks_heading")
     listing = lazy_call("camtool_postprocessors.gcode.blocks:listing")
+    twin_kind = lazy_name("camtool_postprocessors.linuxcnc.twin:LinuxcncTwin")
 
     def check(self, machine: LinuxcncMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -69,12 +70,6 @@ class Linuxcnc(Target):
             "follow the trajectory",
             "halscope shows its pins; camtool preview --simulate FILE.html plays the trajectory",
         )
-
-    def twin_kind(self) -> TwinKind:
-        """Return the virtual controller; docs/wires/linuxcnc.md."""
-        from .twin import LinuxcncTwin, LinuxcncTwinSettings
-
-        return TwinKind(LinuxcncTwinSettings, LinuxcncTwin)
 
     def unit_mm(self, machine: LinuxcncMachine, axis: Axis) -> float:
         """Return the last decimal of a coordinate."""

@@ -56,6 +56,7 @@ class LinuxcncTwinSettings(ProbedPart, frozen=True, forbid_unknown_fields=True, 
 class LinuxcncTwin(Twin):
     """A LinuxCNC that has just been started, its slides at machine zero."""
 
+    settings = LinuxcncTwinSettings
     wire = "linuxcncrsh, TCP"
 
     def __init__(

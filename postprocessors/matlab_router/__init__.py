@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from camtool.target.contract import Target, TwinKind, lazy_call
+from camtool.target.contract import Target, lazy_call, lazy_name
 from camtool.target.signals import NoSignals
 
 from .dialect import (
@@ -49,6 +49,7 @@ class MatlabRouter(Target):
     read = lazy_call("camtool_postprocessors.matlab_router.read:read_program")
     wire = lazy_call("camtool_postprocessors.matlab_router.wire:MatlabRouterWire")
     listing = lazy_call("camtool_postprocessors.matlab_router.jobs:listing")
+    twin_kind = lazy_name("camtool_postprocessors.matlab_router.twin:MatlabRouterTwin")
 
     def check(self, machine: MatlabRouterMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -89,12 +90,6 @@ class MatlabRouter(Target):
         from .wire import rest_of
 
         return rest_of(data, machine, first)
-
-    def twin_kind(self) -> TwinKind:
-        """Return the virtual controller; docs/wires/matlab-router.md."""
-        from .twin import MatlabRouterTwin, MatlabRouterTwinSettings
-
-        return TwinKind(MatlabRouterTwinSettings, MatlabRouterTwin)
 
 
 POST = MatlabRouter()

@@ -58,6 +58,7 @@ class MatlabRouterTwinSettings(
 class MatlabRouterTwin(Twin):
     """The master after a reset, its slides at part zero."""
 
+    settings = MatlabRouterTwinSettings
     wire = "USB (CDC), whose rate means nothing"
 
     def __init__(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, get_args
 
-from camtool.target.contract import Target, TwinKind, lazy_call
+from camtool.target.contract import Target, lazy_call, lazy_name
 
 from .dialect import Interpolator, PicMmhController, PicMmhDialect, PicMmhLink, PicMmhMachine
 
@@ -35,6 +35,7 @@ class PicMmh(Target):
     model = lazy_call("camtool_postprocessors.pic_mmh.controller:PicMmhModel")
     signals = lazy_call("camtool_postprocessors.pic_mmh.signals:PicMmhSignals")
     wire = lazy_call("camtool_postprocessors.pic_mmh.wire:PicMmhWire")
+    twin_kind = lazy_name("camtool_postprocessors.pic_mmh.twin:PicMmhTwin")
 
     def unit_mm(self, machine: PicMmhMachine, axis: Axis) -> float:
         """Return the coarser of the last decimal of a coordinate and a step."""
@@ -55,12 +56,6 @@ class PicMmh(Target):
             lines.append(line + block[: len(block) - len(block.lstrip(BLANKS))].count("\n"))
             line += block.count("\n")
         return Listing(tuple(block.strip(BLANKS) + ";" for block in blocks), lines=tuple(lines))
-
-    def twin_kind(self) -> TwinKind:
-        """Return the virtual controller; docs/wires/pic-mmh.md."""
-        from .twin import PicMmhTwin, PicMmhTwinSettings
-
-        return TwinKind(PicMmhTwinSettings, PicMmhTwin)
 
 
 POST = PicMmh()

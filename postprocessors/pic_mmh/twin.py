@@ -65,6 +65,7 @@ class PicMmhTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True
 class PicMmhTwin(Twin):
     """The controller with an empty buffer, its part zero where its slides stand."""
 
+    settings = PicMmhTwinSettings
     wire = "RS-232, its rate is not known"
 
     def __init__(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Target, TwinKind, lazy_call
+from camtool.target.contract import Target, lazy_call, lazy_name
 
 from ..gcode.meanings import MEANINGS
 from .dialect import ValcncController, ValcncDialect, ValcncLink, ValcncMachine, check, scales_of
@@ -31,6 +31,7 @@ class Valcnc(Target):
     signals = lazy_call("camtool_postprocessors.valcnc.signals:ValcncSignals")
     wire = lazy_call("camtool_postprocessors.valcnc.wire:ValcncWire")
     listing = lazy_call("camtool_postprocessors.gcode.blocks:listing")
+    twin_kind = lazy_name("camtool_postprocessors.valcnc.twin:ValcncTwin")
 
     def check(self, machine: ValcncMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -40,12 +41,6 @@ class Valcnc(Target):
         """Return the last decimal of a coordinate in mm, on the axis where it is coarsest."""
         dialect = machine.dialect
         return float(10.0**-dialect.decimals / scales_of(machine, dialect).min())
-
-    def twin_kind(self) -> TwinKind:
-        """Return the virtual controller; docs/wires/valcnc.md."""
-        from .twin import ValcncTwin, ValcncTwinSettings
-
-        return TwinKind(ValcncTwinSettings, ValcncTwin)
 
 
 POST = Valcnc()

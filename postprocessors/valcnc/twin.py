@@ -63,6 +63,7 @@ def _with_all_defined(
 class ValcncTwin(Twin):
     """The controller at rest at part zero, which is where its slides stand."""
 
+    settings = ValcncTwinSettings
     wire = "9600 8N1"
     byte_s = 10.0 / 9600.0
 
