@@ -20,6 +20,15 @@ Bools = npt.NDArray[np.bool_]
 Octets = npt.NDArray[np.uint8]
 
 
+def columns_of(rows: npt.NDArray[Number]) -> npt.NDArray[Number]:
+    """Return rows (N, K) as columns (K, N), each of them contiguous.
+
+    numpy reduces a column in one loop, but rows of two or three numbers in N of them, which takes
+    20 to 40 times as long; the sum of a row has the same order in both.
+    """
+    return np.ascontiguousarray(rows.T)
+
+
 def distinct(values: npt.NDArray[Number]) -> npt.NDArray[Number]:
     """Return the values (K,) of an array in ascending order, without repeats.
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints, distinct
+from camtool.arrays import Bools, Floats, Ints, columns_of, distinct
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import Segments
 from camtool.kernels import near
@@ -111,7 +111,7 @@ def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[
     one, other = BoxIndex(boxes_b).touching(_grown_boxes(boxes_a, reach_mm))
     low = np.maximum(boxes_a[one, :2], boxes_b[other, :2])
     high = np.minimum(boxes_a[one, 2:], boxes_b[other, 2:])
-    is_near = (low <= high + reach_mm).all(axis=1)
+    is_near = columns_of(low <= high + reach_mm).all(axis=0)
     one, other = one[is_near], other[is_near]
     order = np.lexsort((boxes_b[other, 0], one))
     for begin in range(0, len(order), PAIRS_AT_A_TIME):
@@ -224,7 +224,7 @@ def distances_from(points: Floats, moves: Moves) -> Floats:
     if not len(moves.start):
         return distance
     # The search compares a point with all moves within its limit: so it begins with a small one.
-    span = np.ptp(moves.start, axis=0).max() + np.ptp(moves.end, axis=0).max()
+    span = sum(np.ptp(columns_of(ends), axis=1).max() for ends in (moves.start, moves.end))
     limit_mm = max(span / len(moves.start), MIN_LIMIT_MM)
     while len(rows := np.flatnonzero(np.isinf(distance))):
         every = np.array([[0, len(rows), 0, len(moves.start)]])

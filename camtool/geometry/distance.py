@@ -24,7 +24,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import astuple
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, columns_of
 from camtool.geometry.boxes import IndexedCurves, box_pairs
 from camtool.geometry.measure import path_extents, segment_boxes
 from camtool.geometry.polylines import Polyline, Polylines, Segments
@@ -250,8 +250,10 @@ class _PathBoxes(Struct, frozen=True, eq=False):
             (boxes[:2] - reach_mm, boxes[2:] + reach_mm)
             for boxes in (self.paths[row], others.paths[column])
         )
-        one = one[((one[:, :2] <= other_high) & (one[:, 2:] >= other_low)).all(axis=1)]
-        other = other[((other[:, :2] <= high) & (other[:, 2:] >= low)).all(axis=1)]
+        is_near_one = (one[:, :2] <= other_high) & (one[:, 2:] >= other_low)
+        is_near_other = (other[:, :2] <= high) & (other[:, 2:] >= low)
+        one = one[columns_of(is_near_one).all(axis=0)]
+        other = other[columns_of(is_near_other).all(axis=0)]
         return any(len(rows) for rows, _ in box_pairs(one, other, reach_mm=reach_mm))
 
 
@@ -405,7 +407,7 @@ def _turn_left(vectors: Floats) -> Floats:
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray((a * b).sum(axis=-1))
+    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1])
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

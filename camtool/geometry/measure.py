@@ -55,7 +55,7 @@ def signed_areas(lines: Polylines) -> Floats:
         start, end = segments.start - anchors, segments.end - anchors
         below = 0.5 * (start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0])
         chord = segments.end - segments.start
-        segment_areas = (chord**2).sum(axis=1) * _area_beside(segments.bulge)
+        segment_areas = dot(chord, chord) * _area_beside(segments.bulge)
         np.add.at(inside, segments.path, below + segment_areas)
     areas[rows] = inside
     return areas

@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from camtool.arrays import columns_of
 from camtool.kernels.near import hilbert_places
 
 Floats = npt.NDArray[np.float64]
@@ -84,8 +85,8 @@ def hilbert_order_of(count: int, middles: Callable[[Ints], Floats]) -> Indices:
     lots = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for lot in lots:
-        places = middles(np.arange(*lot))
-        low, high = np.minimum(low, places.min(axis=0)), np.maximum(high, places.max(axis=0))
+        columns = columns_of(middles(np.arange(*lot)))
+        low, high = np.minimum(low, columns.min(axis=1)), np.maximum(high, columns.max(axis=1))
     size = max(float((high - low).max()), np.finfo(np.float64).tiny)
     place = np.empty(count, dtype=np.uint32)
     for lot in lots:

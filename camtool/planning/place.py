@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Floats, Ints, columns_of
 from camtool.errors import GeometryError, OptionError
 from camtool.findings import Finding, Severity
 from camtool.geometry.drawing import Drawing, Gap, Healing, Unchosen
@@ -210,8 +210,9 @@ def _box_slack(drawing: Drawing, job: Job, frame_map: AffineMap) -> Floats:
     for first in range(0, len(every), SEGMENTS_AT_ONCE):
         rows = every[first : first + SEGMENTS_AT_ONCE]
         boxes, slack = segment_boxes(Segments.leaving(lines, rows)), off_mm[rows][:, None]
-        low = np.minimum(low, [(boxes[:, :2] + k * slack).min(axis=0) for k in (0, -1, 1)])
-        high = np.maximum(high, [(boxes[:, 2:] + k * slack).max(axis=0) for k in (0, -1, 1)])
+        lows, highs, slack = columns_of(boxes[:, :2]), columns_of(boxes[:, 2:]), slack.T
+        low = np.minimum(low, [(lows + k * slack).min(axis=1) for k in (0, -1, 1)])
+        high = np.maximum(high, [(highs + k * slack).max(axis=1) for k in (0, -1, 1)])
     if marks:
         points = frame_map.points(np.array([drawing.marks[index].at_mm for index in marks]))
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
@@ -337,7 +338,7 @@ def _refuse_too_large(placed_drawing: Drawing, job: Job) -> None:
     if len(places) == 0:
         return
     times = ALLOWED_TIMES if "long" in job.allow else 1.0
-    size, max_size = float(np.ptp(places, axis=0).max()), MAX_SIZE_MM * times
+    size, max_size = float(np.ptp(columns_of(places), axis=1).max()), MAX_SIZE_MM * times
     if not size <= max_size:
         key = _enlarging_key(job.placement)
         mend = f"give a smaller {key}" if key else "give --units, a scale, or the --layer to cut"

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Floats, Ints, columns_of
 from camtool.errors import MachineError
 from camtool.kernels.motion import entry_speeds
 from camtool.machine.model import Machine
@@ -96,7 +96,8 @@ def max_along(limit: Floats, unit: Floats) -> Floats:
     """Return (B,) the largest value (speed or acceleration) along each unit vector (B, 3) with
     which no axis exceeds its limit (3,)."""
     with np.errstate(divide="ignore", over="ignore"):
-        return np.asarray((limit / np.abs(unit)).min(axis=1, initial=np.inf))
+        each_axis = limit[:, None] / np.abs(columns_of(unit))
+        return np.asarray(each_axis.min(axis=0, initial=np.inf))
 
 
 def axis_limits(machine: Machine, key: str) -> Floats:

@@ -17,7 +17,7 @@ from typing import Any, Literal, TypeVar, cast
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Codes, Floats, Indices, Ints
+from camtool.arrays import Bools, Codes, Floats, Indices, Ints, columns_of
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.records import replace
@@ -305,7 +305,7 @@ def _sweeps(kind: Codes, begin: Floats, end: Floats, centre: Floats) -> Floats:
     end_angle = np.arctan2(end[:, 1] - centre[:, 1], end[:, 0] - centre[:, 0])
     sign = np.where(kind == Kind.ARC_CW, -1.0, 1.0)
     turn = np.mod(sign * (end_angle - from_), full_turn)
-    same_ends = (end[:, :2] == begin[:, :2]).all(axis=1)
+    same_ends = columns_of(end[:, :2] == begin[:, :2]).all(axis=0)
     return np.asarray(sign * np.where(same_ends | (turn == 0.0), full_turn, turn))
 
 
@@ -413,9 +413,9 @@ def toolpath_extents(toolpath: Toolpath, *, rows: Bools | None = None) -> Floats
     low = high = points[0][0]
     for ends in points:
         for first in range(0, len(ends), ROWS_AT_ONCE):
-            batch = ends[first : first + ROWS_AT_ONCE]
-            low = np.concatenate([low[None, :], batch]).min(axis=0)
-            high = np.concatenate([high[None, :], batch]).max(axis=0)
+            columns = columns_of(ends[first : first + ROWS_AT_ONCE])
+            low = np.minimum(low, columns.min(axis=1))
+            high = np.maximum(high, columns.max(axis=1))
     tops = _arc_extremes(toolpath, np.flatnonzero(arcs))
     if len(tops):
         low[:2] = np.minimum(low[:2], tops.min(axis=0))

@@ -23,7 +23,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Indices, Ints, distinct, distinct_rows
 from camtool.findings import Finding, Sentence
 from camtool.geometry.boxes import near_points
-from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
+from camtool.geometry.measure import dot, point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.records import replace
 from camtool.simulation.rows import block_of
@@ -643,7 +643,7 @@ def _same_direction(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Indi
             for path, side_rows in ((cuts.toolpath, batch), (source.toolpath, row_from[batch]))
         )
         lengths = np.hypot(*chords.T) * np.hypot(*other.T)
-        is_same[low : low + len(batch)] = (chords * other).sum(axis=1) > MIN_SAME_COSINE * lengths
+        is_same[low : low + len(batch)] = dot(chords, other) > MIN_SAME_COSINE * lengths
     return is_same
 
 

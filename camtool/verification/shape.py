@@ -290,11 +290,12 @@ def _deepest(region: Any, edges: Moves, spacing_mm: float) -> tuple[float, tuple
     length = np.hypot(*(lines[:, 1] - lines[:, 0]).T)
     bound = 0.5 * (distance[starts] + distance[starts + 1] + length)
     is_asked = (length > spacing_mm) & (bound > distance[deepest])
-    places = shapely.get_coordinates(
-        shapely.segmentize(shapely.linestrings(lines[is_asked]), spacing_mm)
+    places, line = shapely.get_coordinates(
+        shapely.segmentize(shapely.linestrings(lines[is_asked]), spacing_mm), return_index=True
     )
+    places = places[1:-1][(line[1:-1] == line[:-2]) & (line[1:-1] == line[2:])]  # not its corners
+    distance = np.append(distance[deepest], distances_from(places, edges))
     places = np.concatenate([corners[deepest][None], places])
-    distance = np.append(distance[deepest], distances_from(places[1:], edges))
     x, y = places[int(distance.argmax())].tolist()
     return float(distance.max()), (x, y)
 

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, columns_of
 from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine
 from camtool.records import replace
@@ -314,7 +314,7 @@ class Blocks(Struct, frozen=True, eq=False):
     @property
     def events(self) -> Shorts:
         """Step events (B,) of each block: the steps of the axis that has the most."""
-        return np.asarray(np.abs(self.way).max(axis=1, initial=0))
+        return np.asarray(np.abs(columns_of(self.way)).max(axis=0, initial=0))
 
     def part(self, low: int, high: int) -> Blocks:
         """Return the blocks low:high."""
@@ -354,7 +354,7 @@ def blocks_from(
     the position where the last block ends; and the number of targets."""
     targets = targets_of(path, rows, machine, controller)
     stop = _nearest_steps(targets.mm, machine)
-    is_far = (np.abs(stop) > MAX_STEPS).any(axis=1)
+    is_far = columns_of(np.abs(stop) > MAX_STEPS).any(axis=0)
     if is_far.any():
         row = int(targets.row[is_far.argmax()])
         block = int(path.block[row])
@@ -365,7 +365,7 @@ def blocks_from(
     start = np.concatenate([begin, stop])
     begin, start = start[-1:], start[:-1]
     travel = stop - start
-    moves = np.flatnonzero(travel.any(axis=1))
+    moves = np.flatnonzero(columns_of(travel).any(axis=0))
     columns = targets.row[moves], moves, start[moves], travel[moves]
     return Blocks(*(column.astype(np.int32) for column in columns)), begin, len(travel)
 
@@ -405,7 +405,7 @@ def speeds_of(
     for low in range(0, len(blocks), BLOCKS_AT_ONCE):
         batch = slice(low, low + BLOCKS_AT_ONCE)
         travels = blocks.way[max(low - 1, 0) : batch.stop] * step_mm
-        lengths = np.sqrt((travels**2).sum(axis=1))
+        lengths = np.sqrt(columns_of(travels**2).sum(axis=0))
         units = travels / lengths[:, None]
         turn = np.diff(units, axis=0, prepend=units[: 1 if low == 0 else 0])
         earlier = 0 if low == 0 else 1
@@ -415,11 +415,11 @@ def speeds_of(
         cuts = (path.kind[row] >= Kind.LINE) & (path.kind[row] <= Kind.ARC_CCW)
         feed = np.where(cuts, path.feed[row], np.inf) / 60.0
         speed = np.maximum(np.minimum(feed, highest), MIN_SPEED_MM_S)
-        events = np.abs(blocks.way[batch]).max(axis=1, initial=0)
+        events = np.abs(columns_of(blocks.way[batch])).max(axis=0, initial=0)
         speed = np.maximum(speed, controller.least_step_hz * length / events)
         lengths_mm[batch], speeds[batch] = length, speed
         along[batch] = max_along(acceleration, unit)
-        across = np.sqrt((turn**2).sum(axis=1))
+        across = np.sqrt(columns_of(turn**2).sum(axis=0))
         cosine = 0.5 * across**2 - 1.0  # of the angle between the way back and the way on
         half_sine = np.sqrt(np.clip(0.5 * (1.0 - cosine), 0.0, 1.0))
         turn /= np.where(across > 0.0, across, 1.0)[:, None]

@@ -26,7 +26,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Ints, columns_of
 from camtool.machine.model import Machine
 from camtool.records import replace
 from camtool.simulation.motion import Options
@@ -1029,7 +1029,8 @@ def _meet(
     # A kink: the change of velocity within one period, as a part of what each axis can do.
     highest = np.minimum(moves.speed[rows - 1], moves.speed[rows])
     jolt = highest / rules.period_s + moves.acceleration[rows]
-    part = (np.abs(turn) * jolt[:, None] / rules.acceleration).max(axis=1, initial=0.0)
+    part = np.abs(turn) * jolt[:, None] / rules.acceleration
+    part = columns_of(part).max(axis=0, initial=0.0)
     curved = moves.is_arc[rows] | moves.is_arc[rows - 1]
     part = np.where(curved, part / TANGENT_RATIO, part)
     smooth = is_free & (part < rules.kink_ratio)

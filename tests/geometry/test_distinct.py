@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from camtool.arrays import distinct, distinct_rows
+from camtool.arrays import columns_of, distinct, distinct_rows
 
 NUMBERS = st.integers(-4, 4)
 
@@ -24,3 +24,12 @@ def test_distinct_values(values: np.ndarray) -> None:
 @given(arrays(np.int64, st.tuples(st.integers(0, 8), st.integers(1, 3)), elements=NUMBERS))
 def test_distinct_rows(rows: np.ndarray) -> None:
     assert np.array_equal(distinct_rows(rows), np.unique(rows, axis=0))
+
+
+@given(st.integers(0, 40), st.integers(1, 3), st.integers(0, 1000))
+def test_columns_are_reduced_as_rows_are(count: int, width: int, seed: int) -> None:
+    rows = np.random.default_rng(seed).normal(size=(count, width))
+    columns = columns_of(rows)
+    assert all(column.flags.c_contiguous for column in columns)
+    assert np.array_equal(columns.sum(axis=0), rows.sum(axis=1))
+    assert np.array_equal(columns.T, rows)
