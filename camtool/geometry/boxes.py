@@ -2,8 +2,7 @@
 
 `BoxIndex` finds which of its boxes touch others; `box_pairs` and `near_points` use it.
 `touching_boxes` gives the pairs within one set, up to a bound. `IndexedCurves` are segments in the
-form of the compiled loops, with the tree of boxes that those loops search themselves.
-"""
+form of the compiled loops, with the tree of boxes that those loops search themselves."""
 
 from __future__ import annotations
 
@@ -50,8 +49,7 @@ class BoxIndex:
     single one; each level is four arrays, without pointers. A search goes down level by level, for
     many boxes at once, into the blocks that they touch. Few boxes stay in the given order, in
     which those of a path are neighbours; many are sorted along Hilbert's curve, since paths that
-    surround each other are not neighbours. The order affects the time alone, not the result.
-    """
+    surround each other are not neighbours. The order affects the time alone, not the result."""
 
     def __init__(self, boxes: Floats) -> None:
         self._count = len(boxes)
@@ -79,8 +77,7 @@ class BoxIndex:
         """Yield the rows of pairs of a box and one of the index that have a point in common, in
         batches that bound the memory.
 
-        Rows of `boxes` never descend, those of the index come in any order.
-        """
+        Rows of `boxes` never descend, those of the index come in any order."""
         columns = np.ascontiguousarray(boxes.T)
         waiting = [(0, np.arange(len(boxes)), np.zeros(len(boxes), dtype=np.int64))]
         while waiting:
@@ -106,8 +103,7 @@ def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[
     than `reach_mm`.
 
     They come in batches that bound the memory, sorted by the rows of `boxes_a`, and for each of
-    these by the left edges in `boxes_b`.
-    """
+    these by the left edges in `boxes_b`."""
     one, other = BoxIndex(boxes_b).touching(_grown_boxes(boxes_a, reach_mm))
     low = np.maximum(boxes_a[one, :2], boxes_b[other, :2])
     high = np.minimum(boxes_a[one, 2:], boxes_b[other, 2:])
@@ -195,8 +191,7 @@ def curve_rows_of(segments: Segments) -> Floats:
 def moves_of(segments: Segments, heights: Floats | None = None) -> Moves:
     """Return the segments in the form that `camtool.kernels.near` takes.
 
-    `heights` (K, 2) mm are those of their starts and ends, 0 if not given.
-    """
+    `heights` (K, 2) mm are those of their starts and ends, 0 if not given."""
     rows = np.flatnonzero(segments.bulge)
     arc = np.broadcast_to(np.int32(-1), len(segments))
     if len(rows):
@@ -239,8 +234,7 @@ def nearest_pairs(
     """Return the distance (P,) mm of each point (P, 2) from the nearest move, and the rows (J,),
     (J,) of pairs of a point and a move nearly as near.
 
-    A move is in a pair if its distance is at most `times` the nearest one plus `slack_mm`.
-    """
+    A move is in a pair if its distance is at most `times` the nearest one plus `slack_mm`."""
     distance = distances_from(points, moves)
     reach = times * distance + slack_mm
     places = np.column_stack([points, np.zeros(len(points))])

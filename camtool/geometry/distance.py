@@ -12,8 +12,7 @@ centre.)
 
 Between two segments that do not cross, the least distance is met at an end of one of them, at the
 foot of an arc's centre on a line, or on the line through two centres: a few candidates, all
-measured with the formula above.
-"""
+measured with the formula above."""
 
 from __future__ import annotations
 
@@ -76,8 +75,7 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
     are no segments.
 
     A tree over the segments gives those that are hardly farther than the nearest one, and the
-    formula above decides among them.
-    """
+    formula above decides among them."""
     if len(segments) == 0:
         raise ValueError("no segments to be near to")
     order = hilbert_order(segments.start, segments.end)
@@ -123,8 +121,7 @@ def approaches(
     """Return the least distance (`approach`) of each pair of a path of `lines` and one of
     `others`, given by their indices.
 
-    Pairs with few segments are measured together.
-    """
+    Pairs with few segments are measured together."""
     return list(each_approach(lines, others, pairs))
 
 
@@ -134,8 +131,7 @@ def each_approach(
     """Yield the results of `approaches` one by one.
 
     Pairs are taken in batches, and those with many segments are measured only when the caller asks
-    for them.
-    """
+    for them."""
     one, other = _PathRows.of(lines), _PathRows.of(others)
     counts, other_counts = np.diff(one.first), np.diff(other.first)
     elements = np.maximum(np.diff(lines.offsets), counts)
@@ -193,8 +189,7 @@ def _crossed(first: Ints, rows: Ints, other_first: Ints, columns: Ints) -> tuple
     pair of paths.
 
     They are three columns (J,): the pair, the element of one, the element of the other. Elements
-    are numbered path after path, those of path i from first[i] on.
-    """
+    are numbered path after path, those of path i from first[i] on."""
     across = np.diff(other_first)[columns]
     counts = np.diff(first)[rows] * across
     pair = np.repeat(np.arange(len(rows)), counts)
@@ -215,8 +210,7 @@ def near_paths(lines: Polylines, targets: Polylines, reach_mm: float) -> Iterato
     """Yield pairs of paths that may come within `reach_mm` of each other.
 
     Their boxes do, and for paths with many segments boxes of single segments too; true distances
-    are not measured.
-    """
+    are not measured."""
     one, other = _PathBoxes.of(lines), _PathBoxes.of(targets)
     for rows, columns in box_pairs(one.paths, other.paths, reach_mm=reach_mm):
         counts = np.diff(one.first)[rows] * np.diff(other.first)[columns]
@@ -353,8 +347,7 @@ def _toward(
 
     It is infinite where `b` is a line, where the centres coincide (then ends are as near), and
     where that point is not within `a`. If one circle lies within the other, this finds the nearest
-    points with `a` and `b` exchanged.
-    """
+    points with `a` and `b` exchanged."""
     centre = np.where(b.is_arc[:, None], b.centre, rows_a.a)
     part = _dot(centre - rows_a.a, rows_a.d) / _dot(rows_a.d, rows_a.d)
     foot = rows_a.a + part[:, None] * rows_a.d
@@ -373,8 +366,7 @@ def _common_points(a: _SegmentRows, b: _SegmentRows) -> tuple[Floats, Floats]:
 
     power(x) = 4b |x|² + l·x + k, and 4b_b·power_a − 4b_a·power_b is linear: the line through both
     points. (Two lines: power_a itself is it.) On that line, x0 + s e, the power of the rounder one
-    of both is a quadratic in s.
-    """
+    of both is a quadratic in s."""
     origin = a.a
     linear_a, constant_a = a.expanded(origin)
     linear_b, constant_b = b.expanded(origin)
@@ -395,10 +387,7 @@ def _common_points(a: _SegmentRows, b: _SegmentRows) -> tuple[Floats, Floats]:
     root = np.sqrt(slope**2 - 4.0 * four_b * value)
     stable = -0.5 * (slope + np.copysign(root, slope))
     one, second_root = stable / four_b, value / stable
-    return (
-        origin + foot + one[:, None] * along,
-        origin + foot + second_root[:, None] * along,
-    )
+    return (origin + foot + one[:, None] * along, origin + foot + second_root[:, None] * along)
 
 
 def _turn_left(vectors: Floats) -> Floats:

@@ -5,8 +5,7 @@ f the part of the sweep that is done, a point of the arc is
 
     start + sin(f/2)/sin(sweep/2) · d turned by (f − sweep)/2,
 
-which stays exact when a shallow arc has its centre a kilometre away.
-"""
+which stays exact when a shallow arc has its centre a kilometre away."""
 
 from __future__ import annotations
 
@@ -44,8 +43,7 @@ def segment_lengths(segments: Segments) -> Floats:
 def signed_areas(lines: Polylines) -> Floats:
     """Return the area (M,) inside each closed path, mm², CCW positive; 0 for open paths.
 
-    Exact with arcs: the shoelace formula over the chords and the area between chord and arc.
-    """
+    Exact with arcs: the shoelace formula over the chords and the area between chord and arc."""
     rows = np.flatnonzero(lines.closed)
     areas, lines = np.zeros(len(lines)), lines.select(rows.tolist())
     inside = np.zeros(len(lines))
@@ -65,8 +63,7 @@ def _area_beside(bulge: Floats) -> Floats:
     """Return the signed area between a chord of length 1 and its arc of this bulge.
 
     radius²/2 · (sweep − sin sweep) with radius = (1 + b²)/(4|b|) and sin sweep = 4b(1 − b²)/(1 +
-    b²)²; for small b it is b/3 · (1 + b²/5 + …).
-    """
+    b²)²; for small b it is b/3 · (1 + b²/5 + …)."""
     shallow = np.abs(bulge) < SHALLOW_BULGE
     b = np.where(shallow, 1.0, bulge)
     square = b * b
@@ -101,8 +98,7 @@ def _extremes(segments: Segments) -> tuple[Ints, Floats]:
     row (J,) of the arc of each.
 
     The tangent turns from chord direction − sweep/2 to chord direction + sweep/2; it is parallel
-    to an axis at the multiples of 90° between, of which |sweep| ≤ 180° has three at most.
-    """
+    to an axis at the multiples of 90° between, of which |sweep| ≤ 180° has three at most."""
     quarter = 0.5 * np.pi
     rows = np.flatnonzero(segments.is_arc)
     chord = segments.end[rows] - segments.start[rows]
@@ -187,8 +183,7 @@ def sample(p: Polyline, step_mm: float) -> Floats:
     """Return points (J, 2) along the path, on its lines and arcs, no farther apart than `step_mm`,
     all its vertices among them.
 
-    The first point of a closed path is not repeated at the end.
-    """
+    The first point of a closed path is not repeated at the end."""
     if not step_mm > 0.0:
         raise GeometryError(f"a step of {step_mm} mm is not above 0")
     segments = Segments.of(p)
@@ -256,8 +251,7 @@ class Frames(Struct, frozen=True, eq=False):
     def gap(self, points: Floats) -> Floats:
         """Return the distance (K,) mm of each point (K, 2) from the whole line or circle.
 
-        With g = k|q|² − 2 n·q the distance from the centre squared is (1 + k g)/k².
-        """
+        With g = k|q|² − 2 n·q the distance from the centre squared is (1 + k g)/k²."""
         q = points - self.start
         g = self.curvature * dot(q, q) - 2.0 * dot(self.normal, q)
         return np.asarray(np.abs(g) / (1.0 + np.sqrt(np.maximum(1.0 + self.curvature * g, 0.0))))
@@ -267,8 +261,7 @@ class Frames(Struct, frozen=True, eq=False):
         negative before the start.
 
         The chord to the point makes half the swept angle with the tangent; points before the start
-        show as half angles beyond the middle of what remains.
-        """
+        show as half angles beyond the middle of what remains."""
         q = points - self.start
         side = np.where(self.curvature < 0.0, -1.0, 1.0)
         half = np.arctan2(side * dot(self.normal, q), dot(self.tangent, q))

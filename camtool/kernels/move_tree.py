@@ -6,8 +6,7 @@ moves along Hilbert's curve through their middles, which stays in a square until
 is near in the list is near in the plane. A node also knows the first and the last row below it.
 
 Nodes are in heap order as there: the root is 1, node i has the children 2i and 2i + 1, each leaf
-holds `LEAF` moves of the order. Made by numpy, in a few turns for each level.
-"""
+holds `LEAF` moves of the order. Made by numpy, in a few turns for each level."""
 
 from __future__ import annotations
 

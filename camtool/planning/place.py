@@ -4,8 +4,7 @@
 
 Every point goes through one map, p ↦ M p + d, with M = s · R · F: the scale s, the rotation R and
 the mirror F. All three keep angles, so a bulge keeps its size; a mirror changes its sign. A set-up
-that turns the part over is a mirror too, behind all others.
-"""
+that turns the part over is a mirror too, behind all others."""
 
 from __future__ import annotations
 
@@ -89,8 +88,7 @@ def place(drawing: Drawing, job: Job) -> Drawing:
     box around all that the operations take. What was found on reading stays in the drawing's
     frame. Points that the scale brings together are merged (`collapse_findings` counts them).
     OptionError for an impossible fit, for a scale that leaves no shape at all, and for what is
-    larger than any machine.
-    """
+    larger than any machine."""
     placed_drawing = drawing if job.placement == Placement() else _place(drawing, job)
     _refuse_too_large(placed_drawing, job)
     return placed_drawing
@@ -110,8 +108,7 @@ def _place(drawing: Drawing, job: Job) -> Drawing:
 def placements(drawing: Drawing, job: Job) -> list[AffineMap]:
     """Return the map of each copy of the drawing into the work frame, row by row.
 
-    Raises OptionError for an impossible fit.
-    """
+    Raises OptionError for an impossible fit."""
     first, shifts = _first_map(drawing, job), _copy_shifts(job.placement)
     first = first.moved(-_origin(drawing, job, first, shifts))
     return [first.moved(shift).turned(job.placement.turn) for shift in shifts]
@@ -120,8 +117,7 @@ def placements(drawing: Drawing, job: Job) -> list[AffineMap]:
 def part_scale(drawing: Drawing, job: Job) -> float:
     """Return the factor from the drawing's size to the part's, from the job's scale or fit.
 
-    Raises OptionError for an impossible fit.
-    """
+    Raises OptionError for an impossible fit."""
     return _first_map(drawing, job).scale
 
 
@@ -414,8 +410,7 @@ def _map_lines(lines: Polylines, maps: list[AffineMap]) -> tuple[Polylines, Ints
     of those that remain; and the mask of the vertices that remain. Points that the scale brings
     together are merged, and a path of one point is dropped.
 
-    OptionError if coordinates overflow, or if no path is left.
-    """
+    OptionError if coordinates overflow, or if no path is left."""
     count = len(maps) * len(lines)
     counts = np.tile(np.diff(lines.offsets), len(maps))
     closed = np.tile(lines.closed, len(maps))

@@ -5,8 +5,7 @@ the entry speed v0 the speed rises with a to a peak, stays there, and falls with
 speed v1:
 
     peak² = min(v², a d + (v0² + v1²)/2)
-    time  = (peak − v0)/a + (peak − v1)/a + (d − (2 peak² − v0² − v1²)/(2a)) / peak
-"""
+    time  = (peak − v0)/a + (peak − v1)/a + (d − (2 peak² − v0² − v1²)/(2a)) / peak"""
 
 from __future__ import annotations
 

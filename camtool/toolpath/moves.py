@@ -4,8 +4,7 @@ A row is either a move (RAPID, LINE, ARC_CW, ARC_CCW) or an event (spindle, dwel
 in the XY plane; G02 is ARC_CW seen from +Z. A full circle is an arc whose end is its start. An arc
 that ends at another height is a helix of one turn at most, Z in proportion to the angle.
 Frame: work frame (part zero), mm; feeds in mm/min. Row i starts where row i−1 ended; row 0 starts
-at `start`. Planning builds it, a target writes it and reads it back, simulation runs it.
-"""
+at `start`. Planning builds it, a target writes it and reads it back, simulation runs it."""
 
 from __future__ import annotations
 
@@ -90,8 +89,7 @@ class PathMode(Struct, frozen=True):
 
     "blend": rounded within `tolerance_mm` (0: as far as the moves allow), lines in a row taken for
     one within `merging_mm` (0: never); "exact-path": met, without a stop where they hardly bend;
-    "exact-stop": met with a stop.
-    """
+    "exact-stop": met with a stop."""
 
     corners: Corners
     tolerance_mm: float = 0.0
@@ -129,8 +127,7 @@ class Toolpath:
     where the machine decides how to meet the corner behind the row (−1 in all rows without modes);
     `drawn` the edges that the rows cut, and `operations` the operation of each row: both None
     except for plans.
-    ValueError when columns disagree.
-    """
+    ValueError when columns disagree."""
 
     kind: Codes
     end: Floats
@@ -204,8 +201,7 @@ class Toolpath:
     def sweeps_of(self, arcs: Ints | Indices) -> Floats:
         """Return the signed sweep (J,) in rad of these rows, all of them arcs.
 
-        CCW: sweep = (angle(end) − angle(start)) mod 2π, taken in (0, 2π];  CW: mirrored.
-        """
+        CCW: sweep = (angle(end) − angle(start)) mod 2π, taken in (0, 2π];  CW: mirrored."""
         ends = self.starts_of(arcs), self.end[arcs], self.centre[arcs]
         return _sweeps(self.kind[arcs], *ends)
 
@@ -364,8 +360,7 @@ class PolarArcs:
 
     An arc whose ends have different distances to its centre (rounded coordinates) is treated as
     a spiral: radius and, in a helix, Z change in proportion to the angle, so that both ends are
-    met.
-    """
+    met."""
 
     def __init__(self, toolpath: Toolpath, is_chosen: Bools) -> None:
         """Raise PostError for an arc without a centre."""
@@ -400,8 +395,7 @@ def toolpath_extents(toolpath: Toolpath, *, rows: Bools | None = None) -> Floats
     """Compute the lowest and highest X, Y and Z (3, 2) mm of all moves and the start, exact for
     arcs; with `rows` (N,) of these moves alone.
 
-    An arc reaches centre ± radius where its sweep passes the direction of an axis.
-    """
+    An arc reaches centre ± radius where its sweep passes the direction of an axis."""
     if rows is None:
         points, arcs = [toolpath.start[None, :], toolpath.end], toolpath.is_arc
     else:

@@ -8,8 +8,7 @@ Decoded moves are sampled and compared with the wanted moves, which gives the ro
 extra cuts, and the wanted contour to which each decoded row belongs. Wanted moves are sampled and
 compared with the decoded moves, which gives what is missing. A sample is compared only with moves
 at its own height (with a slope: at the point nearest to it), so that a lost pass or a wrong depth
-is found. The tolerance of heights allows for slopes that a machine makes in small steps.
-"""
+is found. The tolerance of heights allows for slopes that a machine makes in small steps."""
 
 from __future__ import annotations
 
@@ -128,8 +127,7 @@ def cover(
 
     A contour is compared with the one that it was written from, or that was written from it,
     first, and only where that does not fit with everything
-    (docs/decisions/0037-own-rows-first.md).
-    """
+    (docs/decisions/0037-own-rows-first.md)."""
     cuts, limits = decoded.cuts, (goal.limit_mm, goal.depth_mm)
     source, became = _contours_from(cuts, wanted_side.cuts, row_from)
     holes = compare_holes(decoded, wanted_side, limits)
@@ -274,8 +272,7 @@ def _rows_alike(cuts: CutMoves, goal: CutMoves, limits: Limits, row_from: Indice
     Two points that run along two lines at once are nowhere farther apart than at one of the ends.
     On two arcs they are no farther apart than both centres and, at one of the ends, both spokes,
     whose angle changes evenly: than twice the centres, an end, and what each end lies beside the
-    circle of its start.
-    """
+    circle of its start."""
     if row_from is None:
         return np.empty(0, dtype=np.int64)
     limit_mm, depth_mm = limits
@@ -384,8 +381,7 @@ def uncovered_contours(
 
     `nearest_found` is the result of `nearest_at_height` for the samples, `drilled` (C,) the
     contours that are holes on the other side. Slopes within the tolerance of the stock top are not
-    counted: they may be flat moves on it, which cut nothing.
-    """
+    counted: they may be flat moves on it, which cut nothing."""
     nearest_moves, wrong_depth = nearest_found
     failing = np.flatnonzero(wrong_depth | (nearest_moves.distance > limits[0]))
     is_judged = ~cuts.slopes(samples.segment[failing])
@@ -484,8 +480,7 @@ def contours_drilled(cuts: CutMoves, holes: Holes, limits_mm: Limits) -> tuple[B
     these holes. The whole contour must lie within the first limit of the hole, and their depths
     must agree within the second.
 
-    A contour smaller than the resolution of a dialect becomes a plunge, which cuts the same.
-    """
+    A contour smaller than the resolution of a dialect becomes a plunge, which cuts the same."""
     drilled = np.zeros(cuts.contour_count, dtype=np.bool_)
     is_contour = np.zeros(len(holes), dtype=np.bool_)
     if not len(holes) or not len(drilled):
@@ -598,8 +593,7 @@ def direction_findings(
 
     Rows that run beside the move from which they were written, in its direction, are fine without
     a search, and so are rows whose middle lies on the contour they came from, in its direction.
-    All others are compared with every move.
-    """
+    All others are compared with every move."""
     cuts = decoded.cuts
     is_open = cuts.is_cut
     if row_from is not None:

@@ -11,8 +11,7 @@ What a cylinder covers is found with true arcs (`swept_outline`), and so is what
 of V bits discs are put together, whose edges are chords. To be compared, outlines become chords
 too, with the same tolerance for both shapes. Depths are therefore wrong by up to twice the
 tolerance, and smaller depths are taken as 0. All depths of a job are seen as one. The predicted
-path is the thinned trace, which needs enough points for its arcs (`points_wanted`).
-"""
+path is the thinned trace, which needs enough points for its arcs (`points_wanted`)."""
 
 from __future__ import annotations
 
@@ -147,8 +146,7 @@ def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
 
     Chords of s mm are s²/(8 r) off an arc of radius r, so s ≤ √(8 r tolerance) for the smallest
     arc is enough. A trace has a point every 2 length / points mm, or up to twice as far apart, and
-    one at the end of each move.
-    """
+    one at the end of each move."""
     arcs = decoded.segments.is_arc
     if cutter is None or len(decoded.rows) > MAX_MOVES:
         return None
@@ -372,8 +370,7 @@ def _swept_hulls(lines: _Lines, cutter: Cutter) -> Any:
     """Return the region that the tool covers at the surface along lines; None without lines.
 
     Between two neighbouring points the radius of a V bit changes evenly: it covers the convex hull
-    of the discs at both; a ball nose on a slope covers a little more than that.
-    """
+    of the discs at both; a ball nose on a slope covers a little more than that."""
     import shapely
 
     starts = np.flatnonzero(lines.line[1:] == lines.line[:-1])
@@ -424,8 +421,7 @@ def _rows_with_heights(trace: SlideTrace, motion: CommandedMotion) -> list[tuple
 
     The height is commanded along the path, not along the way of the slides: at a reversal a slide
     waits in its backlash while Z moves on. Slides simulated on the exact path tell how far along
-    the trace each height is reached.
-    """
+    the trace each height is reached."""
     which = np.flatnonzero(trace.cutting)
     if not len(which):
         return []

@@ -11,8 +11,7 @@ What it does with a program, in the order of this file:
 
 Positions are absolute: a row starts at the step where the one before ended, and no rounding adds
 up. Its numbers, 32-bit floats, are nearer than a hundredth of a step. grbl does not compensate
-backlash.
-"""
+backlash."""
 
 from __future__ import annotations
 
@@ -32,13 +31,7 @@ from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Options
 from camtool.simulation.rows import check_rows
 from camtool.simulation.samples import SampledModel, SampledRows
-from camtool.simulation.speed_plan import (
-    FROM_REST,
-    EntryState,
-    SpeedPlan,
-    axis_limits,
-    max_along,
-)
+from camtool.simulation.speed_plan import FROM_REST, EntryState, SpeedPlan, axis_limits, max_along
 from camtool.simulation.step_lines import LineRows, LineRun
 from camtool.toolpath.moves import EVENTS_AT_REST, Kind, Toolpath, are_arcs
 
@@ -217,10 +210,7 @@ class GrblSamples:
         begin = int(np.searchsorted(self._offsets, low, side="right")) - 1
         end = int(np.searchsorted(self._offsets, high, side="left"))
         commanded = np.empty((high - low, 3))
-        lines = (
-            blocks.start[begin:end].astype(np.int64),
-            blocks.way[begin:end].astype(np.int64),
-        )
+        lines = (blocks.start[begin:end].astype(np.int64), blocks.way[begin:end].astype(np.int64))
         first = (0, low - int(self._offsets[begin]))
         step_lines_fill(lines, first, self._step_mm, commanded)
         bounds = np.clip(self._offsets[begin : end + 1], low, high)
@@ -379,12 +369,7 @@ def _nearest_steps(mm: Singles, machine: _Machine) -> Ints:
 
 
 def speeds_of(
-    blocks: Blocks,
-    path: Toolpath,
-    machine: _Machine,
-    before: EntryState,
-    first: int,
-    stops: Stops,
+    blocks: Blocks, path: Toolpath, machine: _Machine, before: EntryState, first: int, stops: Stops
 ) -> SpeedPlan:
     """Compute the nominal speed of each block from `first` on, and the highest speed through each
     corner.
@@ -394,8 +379,7 @@ def speeds_of(
     `junction_deviation_mm` δ from the corner, and is followed (for its speed alone) at the
     acceleration a that u2 − u1 allows: v² = a δ sin(θ/2) / (1 − sin(θ/2)).
 
-    The timer cannot wait longer than `least_step_hz` says, so slower blocks run at that rate.
-    """
+    The timer cannot wait longer than `least_step_hz` says, so slower blocks run at that rate."""
     controller = machine.controller
     assert isinstance(controller, GrblController)
     step_mm = coded_steps_mm(machine)
@@ -528,8 +512,7 @@ def as_read(values: Floats, machine: _Machine) -> Singles:
 
     The digits form one integer, which is multiplied by 0.01 and 0.1 until the decimal point is in
     its place, with rounding at each step. `dialect.decimals` gives the number of decimals; a
-    number that has more is taken as the nearest float.
-    """
+    number that has more is taken as the nearest float."""
     nearest_single = values.astype(np.float32)
     decimals = machine.dialect.decimals
     scaled = np.abs(values) * 10.0**decimals
@@ -592,8 +575,7 @@ class _Chords:
         """Return the targets inside arcs: (P,) the arc of each, and their positions (P, 3) mm.
 
         A radius vector is turned by the angle of a chord, θ, with cos θ ≈ 1 − θ²/2 and sin θ ≈ θ −
-        θ³/6; after `correction` turns the next one is computed anew.
-        """
+        θ³/6; after `correction` turns the next one is computed anew."""
         inner = segments - 1
         arc = np.repeat(np.arange(len(segments)), inner)
         number = np.arange(len(arc)) - np.repeat(np.cumsum(inner) - inner, inner) + 1

@@ -15,8 +15,7 @@ step, or an encoder to its count: half a step of each axis, which is not in the 
 are counted, not taken. Rounding never adds up.
 
 BACKLASH of an axis (`compensation_mm`) is added at a change of its direction. LinuxCNC spreads
-it over some milliseconds at half of the axis's limits; here it acts at once, and takes no time.
-"""
+it over some milliseconds at half of the axis's limits; here it acts at once, and takes no time."""
 
 from __future__ import annotations
 
@@ -40,13 +39,7 @@ from camtool.simulation.samples import (
     sample_spacing_mm,
     spacing_along,
 )
-from camtool.simulation.speed_plan import (
-    FROM_REST,
-    EntryState,
-    SpeedPlan,
-    axis_limits,
-    max_along,
-)
+from camtool.simulation.speed_plan import FROM_REST, EntryState, SpeedPlan, axis_limits, max_along
 from camtool.toolpath.moves import (
     EVENTS_AT_REST,
     Kind,
@@ -150,8 +143,7 @@ class _Run:
 
     A block of rows begins where a move does. Planned with it are `MOVES_BEFORE` moves before it,
     for the corner between them, and as many moves behind it as the planner knows of. Moves begin
-    at places: twice a row, and one more in the middle of an arc that is two lines.
-    """
+    at places: twice a row, and one more in the middle of an arc that is two lines."""
 
     def __init__(self, path: Toolpath, machine: _Machine) -> None:
         """Read limits and path modes; MachineError for missing limits."""
@@ -348,8 +340,7 @@ def _speeds(
     In the mode "blend" the last move before a wait has half the acceleration: it was kept ready
     for a blend that never came (`tcGetOverallMaxAccel`). So do moves that overlap. In all modes it
     is entered no faster than it could stop within its half, for a blend could have taken the other
-    half (`tpCalculateOptimizationInitialVel`).
-    """
+    half (`tpCalculateOptimizationInitialVel`)."""
     moves, corners = window_plan.moves, window_plan.corners
     own_length, joined_length = _lengths(moves, corners)
     path_lengths = _in_turns(corners.length + joined_length, own_length)
@@ -385,8 +376,7 @@ class _Profile(Struct, frozen=True, eq=False):
     what blends leave of it, and the half of the blend at its end; `rows_s` (P,) of the rows of the
     path, and `origin_s` of the program's rows that these are, or are halves of.
 
-    `block` (M,): the block of the plan for each move, −1 for one of which blends leave nothing.
-    """
+    `block` (M,): the block of the plan for each move, −1 for one of which blends leave nothing."""
 
     window_plan: PlannedWindow
     begin_s: Floats
@@ -481,8 +471,7 @@ def _blend_seconds(window_plan: PlannedWindow, part_seconds: Floats) -> tuple[Fl
     from the time of each blend and move, `part_seconds` (2 M + 1,).
 
     Half of a blend belongs to the row on either side, and a line that joins it to the row before;
-    the rows of a merged line share its time by their lengths.
-    """
+    the rows of a merged line share its time by their lengths."""
     moves, corners = window_plan.moves, window_plan.corners
     _, joined_length = _lengths(moves, corners)
     joined = np.flatnonzero(joined_length)
@@ -523,8 +512,7 @@ class CornerModes(Struct, frozen=True, eq=False):
     """Treatment of the corner behind a row, by its mode (an index, as in `Toolpath.mode`). Columns
     of `table`, a row for each mode: 1 if corners are blended; 1 if the tool stops (neither: it
     follows the path without a stop); the tolerance of blends, mm, inf: none; the tolerance of
-    merging, mm, 0: none.
-    """
+    merging, mm, 0: none."""
 
     table: Floats
 
@@ -641,8 +629,7 @@ def merge_rows(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     line of each row. `tolerance_mm` (N,) of each row; 0: it is not merged.
 
     Only feed moves with the same feed and path mode, and with nothing but moves of no length
-    between them, are merged; any event, an MSG comment too, ends a line.
-    """
+    between them, are merged; any event, an MSG comment too, ends a line."""
     count = len(path)
     if not tolerance_mm.any():
         return path, np.arange(count)
@@ -838,8 +825,7 @@ def _turn_of(before: Floats, after: Floats, ramp: Floats) -> Floats:
     ends and the second begins.
 
     The rest, (1 − x)² `before`, falls, and the covered length, `_covered_share`(x) `after`, grows,
-    so they meet once; found by bisection. 0.5 where nothing overlaps.
-    """
+    so they meet once; found by bisection. 0.5 where nothing overlaps."""
     low, high = np.zeros(len(before)), np.ones(len(before))
     ramp = np.where(before > 0.0, ramp, 1.0)
     for _ in range(TURN_ROUNDS):
@@ -1182,8 +1168,7 @@ def _rounds(
     mm/s and the speed of the axes in that plane (`blendParamKinematics`,
     `blendComputeParameters`).
 
-    In the plane no axis exceeds its limit when the whole is limited to min(limit / √(1 − m²)).
-    """
+    In the plane no axis exceeds its limit when the whole is limited to min(limit / √(1 − m²))."""
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.sqrt(np.maximum(1.0 - normal**2, 0.0))
         acceleration = (rules.acceleration / share).min(axis=1, initial=np.inf)
