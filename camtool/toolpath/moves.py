@@ -202,8 +202,14 @@ class Toolpath:
         """Return the signed sweep (J,) in rad of these rows, all of them arcs.
 
         CCW: sweep = (angle(end) − angle(start)) mod 2π, taken in (0, 2π];  CW: mirrored."""
-        ends = self.starts_of(arcs), self.end[arcs], self.centre[arcs]
-        return _sweeps(self.kind[arcs], *ends)
+        full_turn = 2.0 * np.pi
+        begin, end, centre = self.starts_of(arcs), self.end[arcs], self.centre[arcs]
+        from_ = np.arctan2(begin[:, 1] - centre[:, 1], begin[:, 0] - centre[:, 0])
+        end_angle = np.arctan2(end[:, 1] - centre[:, 1], end[:, 0] - centre[:, 0])
+        sign = np.where(self.kind[arcs] == Kind.ARC_CW, -1.0, 1.0)
+        turn = np.mod(sign * (end_angle - from_), full_turn)
+        same_ends = columns_of(end[:, :2] == begin[:, :2]).all(axis=0)
+        return np.asarray(sign * np.where(same_ends | (turn == 0.0), full_turn, turn))
 
     @property
     def executed_rows(self) -> int:
@@ -294,17 +300,6 @@ def feeds_below_top(toolpath: Toolpath) -> Bools:
     return toolpath.is_feed & are_below_top(toolpath)
 
 
-def _sweeps(kind: Codes, begin: Floats, end: Floats, centre: Floats) -> Floats:
-    """Compute the sweeps (K,) in rad of K arcs, signed as in `Toolpath.sweeps`."""
-    full_turn = 2.0 * np.pi
-    from_ = np.arctan2(begin[:, 1] - centre[:, 1], begin[:, 0] - centre[:, 0])
-    end_angle = np.arctan2(end[:, 1] - centre[:, 1], end[:, 0] - centre[:, 0])
-    sign = np.where(kind == Kind.ARC_CW, -1.0, 1.0)
-    turn = np.mod(sign * (end_angle - from_), full_turn)
-    same_ends = columns_of(end[:, :2] == begin[:, :2]).all(axis=0)
-    return np.asarray(sign * np.where(same_ends | (turn == 0.0), full_turn, turn))
-
-
 def read_only(column: Column) -> Column:
     """Make an array read-only in place and return it: a Toolpath takes it without a copy."""
     column.flags.writeable = False
@@ -374,7 +369,7 @@ class PolarArcs:
         self.radius = np.hypot(start_arm[:, 0], start_arm[:, 1])
         self.end_radius = np.hypot(end_arm[:, 0], end_arm[:, 1])
         self.angle = np.arctan2(start_arm[:, 1], start_arm[:, 0])
-        self.sweep = _sweeps(toolpath.kind[self.row], self.begin, self.end, self.centre)
+        self.sweep = toolpath.sweeps_of(self.row)
 
     def points(self, indices: Ints, share: Floats) -> Floats:
         """Compute the points (K, 3) mm of the arcs `indices` (K,) at `share` (K,) of their
