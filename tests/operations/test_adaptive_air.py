@@ -19,9 +19,10 @@ from camtool.planning.items import CutRun, Step
 from camtool.planning.job import Entry, Job, Operation, Stock, Tool
 from camtool.planning.plan import planned
 from tests.drawings import drawing_of
+from tests.oracles import swept as oracle
 from tests.oracles.contours import closed
 from tests.oracles.engaged import greatest_engagement
-from tests.oracles.swept import area_of, at_depth, gouges, opened, swept
+from tests.oracles.swept import area_of, at_depth, gouges, opened
 from tests.paths import moved
 from tests.planning.pocket_cases import region_of
 
@@ -31,7 +32,9 @@ LIMIT = math.radians(50.0)
 OWN = (("strategy", "adaptive"), ("engagement_rad", LIMIT))
 HELIX = Entry("helix", angle_rad=math.radians(5.0))
 STOCK = Stock(8.0, (0.0, 0.0), (40.0, 30.0))
-CHORD_RAD = 0.02
+CHORD_RAD = 0.05
+SAG = 1e-4
+"""Chords are a hundredth of what may be left, or less, from their arcs."""
 RADIUS = 0.5 * FINE.diameter_mm
 
 
@@ -57,6 +60,10 @@ def steps_of(
     return planned(drawing, Job(operations, stock=stock), machine).steps
 
 
+def swept(paths: list[Polyline], radius_mm: float) -> shapely.Geometry:
+    return oracle.swept(paths, radius_mm, CHORD_RAD, SAG)
+
+
 def check(
     runs: list[CutRun], paths: list[Polyline], air: shapely.Geometry, z: float = -2.0
 ) -> None:
@@ -64,14 +71,14 @@ def check(
     contour, and keeps the limit from there on."""
     region = region_of(paths)
     area = opened(area_of(region), RADIUS, CHORD_RAD)
-    cleared = swept(at_depth(runs, z), RADIUS, CHORD_RAD)
+    cleared = swept(at_depth(runs, z), RADIUS)
     still_there = area.difference(shapely.union(cleared, air))
     assert still_there.area < 3e-3 * area.area
     assert gouges(runs, region, RADIUS) == []
     assert {run.vertices[0, 2] for run in runs} == {z}
     for number in {0, len(runs) - 1}:
         disc = shapely.Point(runs[number].vertices[0, :2]).buffer(RADIUS - 0.02)
-        before = swept(at_depth(runs[:number], z), RADIUS, CHORD_RAD)
+        before = swept(at_depth(runs[:number], z), RADIUS)
         assert disc.difference(shapely.union(air, before)).area < 1e-3
     assert greatest_engagement(runs, RADIUS, 4e-3 * RADIUS, air) <= 1.02 * LIMIT
 
@@ -125,7 +132,7 @@ def test_behind_a_wider_tool_only_the_rest_is_cut(
 ) -> None:
     first, rest = steps_of(paths, passes(**wide), adaptive(rest="wide", depth_mm=None), stock=None)
     (alone,) = steps_of(paths, adaptive())
-    air = swept(at_depth(list(first.runs), -2.0), 4.0, CHORD_RAD)
+    air = swept(at_depth(list(first.runs), -2.0), 4.0)
     check(list(rest.runs), paths, air)
     assert len(rest.runs) == 1
     assert cut_mm(rest) < 0.3 * cut_mm(alone)
@@ -147,7 +154,7 @@ def test_what_others_cleared_is_air_as_far_as_they_are_deep_enough() -> None:
         paths, *before, adaptive(layers=("P",), step_down_mm=1.0), layers=layers
     )
     pocketed, bored = (
-        swept(at_depth(list(step.runs), z), step.operation.tool.radius_mm, CHORD_RAD)
+        swept(at_depth(list(step.runs), z), step.operation.tool.radius_mm)
         for step, z in zip(firsts, (-1.0, -2.0), strict=True)
     )
     levels = [[run for run in last.runs if run.vertices[0, 2] == z] for z in (-1.0, -2.0)]

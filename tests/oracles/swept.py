@@ -76,20 +76,23 @@ def _chords(path: Polyline, sag_mm: float) -> Floats:
     return np.concatenate(points)
 
 
-def swept(paths: Sequence[Polyline], radius_mm: float, most_rad: float) -> shapely.Geometry:
-    """Return the area that a disc covers along the paths."""
-    parts = [near_region(_divided(path, most_rad), radius_mm, most_rad) for path in paths]
+def swept(
+    paths: Sequence[Polyline], radius_mm: float, most_rad: float, sag: float = SAG
+) -> shapely.Geometry:
+    """Return the area that a disc covers along the paths, by chords of a sweep that are no farther
+    from large arcs than a share (`sag`) of the size of their path."""
+    parts = [near_region(_divided(path, most_rad, sag), radius_mm, most_rad) for path in paths]
     return shapely.union_all(parts, grid_size=GRID_MM)
 
 
-def _divided(path: Polyline, most_rad: float) -> Polyline:
+def _divided(path: Polyline, most_rad: float, sag: float) -> Polyline:
     """The path with its large arcs divided, so that chords of a sweep are near to them too."""
     size = float(np.ptp(path.vertices[:, :2], axis=0).max())
     rows: list[Floats] = []
     for start, _, arc in pieces(path):
         count = 1
         if arc is not None and abs(arc.sweep) > 1e-6:
-            fine_rad = math.sqrt(8.0 * SAG * size / arc.radius)
+            fine_rad = math.sqrt(8.0 * sag * size / arc.radius)
             count = 1 if fine_rad > most_rad else math.ceil(abs(arc.sweep) / fine_rad)
         part = np.arange(count) / count
         points = start[None, :] if arc is None or count == 1 else arc.at(part)
