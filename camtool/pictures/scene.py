@@ -180,6 +180,15 @@ class StockPair(Struct, frozen=True, eq=False):
 
         return engagement_of(self.moves, toolpath, self.box_mm if self.known else None)
 
+    def engagement_by_row(self, toolpath: Toolpath, coarse_rad: float) -> Engagement:
+        """Return the same, but only the greatest bound of each row of the toolpath is within an
+        angle; all others are merely bounds."""
+        from camtool.stock.engagement import engagement_of
+
+        box_mm = self.box_mm if self.known else None
+        rows = self.moves.row, np.full(len(toolpath), math.pi)
+        return engagement_of(self.moves, toolpath, box_mm, rows, coarse_rad)
+
 
 class TableLine(Struct, frozen=True):
     """A line of a table: its cells, and the row of the toolpath or the place (x, y) mm to which it

@@ -141,8 +141,9 @@ def engagement_of(
     decoded: Toolpath,
     box_mm: tuple[float, float, float, float] | None,
     limits: tuple[Ints, Floats] | None = None,
+    coarse_rad: float = COARSE_RAD,
 ) -> Engagement:
-    """Bound the engagement of all moves that a decoded program makes, each to within COARSE_RAD.
+    """Bound the engagement of all moves that a decoded program makes, each to within `coarse_rad`.
     `box_mm`: the sides of the stock, None: unlimited.
 
     `limits`: the operation of each move (M,), ascending, and the limit of each operation (K,),
@@ -186,8 +187,8 @@ def engagement_of(
             np.ones(len(part), dtype=np.bool_),
             max(_thick_share(limit[own]) * narrow_mm, THICK_BESIDE * moves.beside_mm),
             limit[own],
-            COARSE_RAD if limits is None else FINE_RAD,
-            coarse_rad=COARSE_RAD,
+            coarse_rad if limits is None else FINE_RAD,
+            coarse_rad=coarse_rad,
             known_rad=greatest[own] if counts else -1.0,
         )
         if counts:

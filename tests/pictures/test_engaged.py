@@ -18,6 +18,7 @@ from camtool.pictures.engaged import engagement_trace
 from camtool.pictures.layers import layers_in
 from camtool.pictures.options import PictureOptions
 from camtool.pictures.scene import Scene, stock_pair
+from camtool.pictures.viewer import columns
 from camtool.pictures.viewer.columns import ENTRY_DEG
 from camtool.pictures.viewer.page import viewer_page
 from camtool.planning.job import Entry, Job, Operation, Tool
@@ -175,6 +176,28 @@ def sampled(
     gaps = np.hypot(*np.moveaxis(rim[None] - start - part[..., None] * along, 2, 0))
     wider = np.where(behind_mm > 100.0 * thick_mm, thick_mm, 0.0)
     return float((gaps > RADIUS_MM - 1e-9 + wider[:, None]).all(axis=0).mean()) * math.pi
+
+
+def test_a_large_program_has_engagements_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A side cut of 60° in 21,000 rows; and in angles that are coarser, as in larger programs."""
+    y = 0.5 * RADIUS_MM - RADIUS_MM
+    builder = ToolpathBuilder().rapid(-9.0, y, 5.0).line(z=-1.0, feed=100.0)
+    for x in np.linspace(-9.0, 49.0, 21_000)[1:].tolist():
+        builder.line(x, y, feed=600.0)
+    toolpath = builder.finish()
+    tools, profile = np.zeros(len(toolpath), dtype=np.int64), CutterProfile(RADIUS_MM, RADIUS_MM)
+    pair = stock_pair(
+        stock_moves_of_toolpath(toolpath, tools, (profile,)), (0.0, 0.0, 40.0, 30.0), 2.0
+    )
+    for few, above_deg in ((columns.FINE_ENGAGED, 1.0), (1, 5.0)):
+        monkeypatch.setattr(columns, "FINE_ENGAGED", few)
+        column = columns.engagement_columns(pair, toolpath)["move_engaged"]
+        angle = np.asarray(column)[(toolpath.end[:, 0] > 4.0) & (toolpath.end[:, 0] < 38.0)]
+        chip_deg = math.degrees(math.acos(1.0 - 0.5 + THICK_SHARE))
+        assert angle.min() >= chip_deg - 0.05
+        assert angle.max() <= 60.0 + above_deg
+    monkeypatch.setattr(columns, "MAX_ENGAGED", 20_000)
+    assert len(columns.engagement_columns(pair, toolpath)["move_engaged"]) == 0
 
 
 def test_rings_of_a_pocket_have_the_angles_of_an_independent_measure() -> None:
