@@ -7,10 +7,6 @@ from typing import Any
 
 import click
 
-from camtool.calibration.calibrate import calibrate as estimated
-from camtool.calibration.calibrate import outliers, to_data, to_text
-from camtool.calibration.machine_file import machine_file
-from camtool.calibration.measurements import read_measurements
 from camtool.cli.files import STDOUT, check_places, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, show_text
@@ -41,6 +37,11 @@ def calibrate(
 
     `camtool coupon` draws them and begins that file. With -o, a machine file for --machine is
     written, with the uncertainty and the source of each number behind it."""
+    from camtool.calibration.calibrate import calibrate as estimated
+    from camtool.calibration.calibrate import outliers, to_data, to_text
+    from camtool.calibration.machine_file import machine_file
+    from camtool.calibration.measurements import read_measurements
+
     flags = MachineFlags.of(target, machine, ()) if target or machine else None
     check_places([measurements, *(flags.files() if flags else ())], [output, report])
     measured = read_measurements(Path(measurements))

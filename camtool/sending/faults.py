@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from random import Random
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from camtool.errors import OptionError
-from camtool.target.twin import Twin
 from camtool.units import parse_time
+
+if TYPE_CHECKING:
+    from camtool.target.twin import Twin
 
 DEFAULT_PROBABILITY: Final = 0.01
 

@@ -320,6 +320,11 @@ def test_help_loads_nothing_heavy() -> None:
     assert not loaded_by("--help") & (HEAVY | {"numpy", "msgspec"})
 
 
+def test_help_of_commands_without_geometry_loads_no_numpy() -> None:
+    loading = [name for name in ("calibrate", "twin") if "numpy" in loaded_by(name, "--help")]
+    assert not loading
+
+
 def test_importing_camtool_loads_its_version_alone() -> None:
     code = "import sys, camtool; dir(camtool); print(*sys.modules)"
     result = subprocess.run(
