@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from camtool.calibration.measurements import read_measurements
 from camtool.cli.files import STDOUT, check_places, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, show_text
@@ -37,10 +38,8 @@ def calibrate(
 
     `camtool coupon` draws them and begins that file. With -o, a machine file for --machine is
     written, with the uncertainty and the source of each number behind it."""
-    from camtool.calibration.calibrate import calibrate as estimated
-    from camtool.calibration.calibrate import outliers, to_data, to_text
+    from camtool.calibration import calibrate as estimation
     from camtool.calibration.machine_file import machine_file
-    from camtool.calibration.measurements import read_measurements
 
     flags = MachineFlags.of(target, machine, ()) if target or machine else None
     check_places([measurements, *(flags.files() if flags else ())], [output, report])
@@ -48,18 +47,18 @@ def calibrate(
     flags = flags or MachineFlags.of(measured.target or None, None, ())
     machine_used = flags.load().machine
     progress().begin("estimating")
-    result = estimated(measured, machine_used)
+    result = estimation.calibrate(measured, machine_used)
     files: dict[str, bytes] = {}
     if output is not None:
         own_table = _own_table(flags.machine, str(flags.name()))
         files[output] = machine_file(result, measured, machine_used, own_table).encode()
     if report is not None:
-        files[report] = to_json(to_data(result, machine_used)).encode()
+        files[report] = to_json(estimation.to_data(result, machine_used)).encode()
     write_all(files)
     if STDOUT not in files and not quiet:
-        for line in to_text(result, machine_used).splitlines():
+        for line in estimation.to_text(result, machine_used).splitlines():
             show_text(one_line(line))
-    for line in outliers(result):
+    for line in estimation.outliers(result):
         say(f"camtool: warning: outlier: {one_line(line)}", quiet=quiet)
     if output is not None:
         say(f"written: {'stdout' if output == STDOUT else output}", quiet=quiet)

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.calibration import servo as bench
-from camtool.calibration.servo import respond, simulate_step
 from camtool.cli.files import STDOUT, check_new, check_places, display_name, read_bytes, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, show_text
@@ -78,6 +76,8 @@ def identify(
     (of the encoder), and drive (percent).
 
     Two drives, or a motor that coasts to rest at the end, determine the friction."""
+    from camtool.calibration import servo as bench
+
     check_places([*responses, *machine.files()], [output, report])
     if output is not None and output != STDOUT:
         check_new(output)
@@ -152,6 +152,8 @@ def design(
 ) -> None:
     """Compute Ki, Kp and the digital Kid, Kpd for the motors of the machine, and what the rounding
     of stored gains and the sampling make of settling time, damping and overshoot."""
+    from camtool.calibration import servo as bench
+
     check_places(machine.files(), [output, report])
     if output is not None and output != STDOUT:
         check_new(output)
@@ -274,6 +276,8 @@ def _answer(
     """Return speed and reference (rpm) and drive (percent) of an axis, tick by tick, in answer to
     a step of its drive (percent) or of its speed (rpm)."""
     import numpy as np
+
+    from camtool.calibration.servo import respond, simulate_step
 
     index = AXES.index(axis)
     motor, ticks = loop.motors[index], round(STEP_S / loop.tick_s)
