@@ -42,24 +42,28 @@ def refuse_start(toolpath: Toolpath) -> None:
 
 def refuse_two_radii(toolpath: Toolpath, max_mm: float) -> None:
     """Refuse arcs whose radii at start and end differ by more than `max_mm`."""
-    spread = radius_spread(toolpath)
     centred = np.isfinite(toolpath.centre).all(axis=1)
     refuse(
         toolpath, toolpath.is_arc & ~centred, "an arc without a centre", "give the arc a centre"
     )
-    with np.errstate(invalid="ignore"):
+    first, last = radii(toolpath)
+    with np.errstate(invalid="ignore", over="ignore"):
+        spread = np.abs(first - last)
         is_bad = toolpath.is_arc & ~(spread <= max_mm)
     refuse(
         toolpath,
         is_bad,
-        lambda row: f"the radii at start and end of an arc differ by {spread[row]:.4f} mm",
+        lambda row: (
+            f"the radii at start and end of an arc differ by {spread[row]:.4f} mm"
+            f" ({first[row]:.4f} and {last[row]:.4f} mm)"
+        ),
         f"they may differ by {max_mm:g} mm",
     )
 
 
-def radius_spread(toolpath: Toolpath) -> Floats:
-    """Compute the difference (N,) mm of an arc's radii at its start and its end; NaN for rows
-    without a centre."""
+def radii(toolpath: Toolpath) -> tuple[Floats, Floats]:
+    """Compute the radii (N,) mm of arcs at their start and at their end; NaN for rows without a
+    centre."""
     with np.errstate(invalid="ignore", over="ignore"):
         start_arm, end_arm = (p[:, :2] - toolpath.centre for p in (toolpath.starts, toolpath.end))
-        return np.asarray(np.abs(np.hypot(*start_arm.T) - np.hypot(*end_arm.T)))
+        return np.hypot(*start_arm.T), np.hypot(*end_arm.T)

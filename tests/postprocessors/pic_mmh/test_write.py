@@ -188,7 +188,10 @@ REFUSED = {
         builder().arc(1, 0, centre=(math.nan, 0), ccw=True, feed=1),
         "an arc without a centre; give the arc a centre",
     ),
-    "arc of two radii": (builder().arc(1, 0, centre=(0.4, 0), ccw=True, feed=1), "differ by 0.2"),
+    "arc of two radii": (
+        builder().arc(1, 0, centre=(0.4, 0), ccw=True, feed=1),
+        r"differ by 0.2000 mm (0.4000 and 0.6000 mm)",
+    ),
     "spindle too fast": (builder().event(Kind.SPINDLE_CW, 10000), "spindle speed 10000"),
     "spindle without speed": (builder().event(Kind.SPINDLE_CW), "without a speed"),
     "tool of three digits": (builder().event(Kind.TOOL_CHANGE, 100), "tool 100"),
