@@ -86,15 +86,19 @@ _ZIPPED = {
 _DXF_START = re.compile(r"\s*(?:0|999)[ \t]*(?:\r\n|\n|\r)")
 _STEP_START = re.compile(r"\s*(?:/\*(?:(?!\*/).)*\*/\s*)*ISO-10303-21\s*;", re.DOTALL)
 _BREP_START = re.compile(r"\s*(?:DBRep_DrawableShape|CASCADE Topology V\d|Open CASCADE Topology)")
-_GERBER_START = re.compile(r"^\s*%(?:FS[LTD]?[AI]?X\d|MO(?:MM|IN)\*|TF\.)", re.MULTILINE)
-_EXCELLON_START = re.compile(r"(?:\s+|;[^\n]*\n|%\s*\n)*M48\b")
+_GERBER_START = re.compile(r"^[^\S\n]*%(?:FS[LTD]?[AI]?X\d|MO(?:MM|IN)\*|TF\.)", re.MULTILINE)
+# Where two repeated parts could match the same blanks, the time grows with their power: 40 blank
+# lines would take hours.
+_EXCELLON_START = re.compile(r"(?:\s|;[^\n]*\n|%[^\S\n]*\n)*M48\b")
 _ROUTER = re.compile(
     r"^[ \t]*(?:l?xy|velxy|[xy]_points|l[xy]|vel[xy]|size_of_array|first_point[xy])[ \t]*=",
     re.MULTILINE,
 )
 _COMMENT = re.compile(r"[ \t]*(?:[#%;(][^\n]*)?(?:\n|$)")
-_G_BLOCK = re.compile(r"\s*/?\s*(?:[NO]\d+|[GM]\s?\d{1,3}(?!\d)|[XYZIJFST]-?\d)", re.I)
-_G_CODE = re.compile(r"^\s*/?\s*(?:[NO]\d+\s*)?[GM]\s?\d{1,3}(?!\w*[ \t]*[,\t])", re.I | re.M)
+_G_BLOCK = re.compile(r"\s*(?:/\s*)?(?:[NO]\d+|[GM]\s?\d{1,3}(?!\d)|[XYZIJFST]-?\d)", re.I)
+_G_CODE = re.compile(
+    r"^[^\S\n]*(?:/\s*)?(?:[NO]\d+\s*)?[GM]\s?\d{1,3}(?!\w*[ \t]*[,\t])", re.I | re.M
+)
 _TWO_FIELDS = re.compile(r"[^\S\n]*[-+.\w]+[^\S\n]*[,;\s][^\S\n]*[-+.\w]+")
 _XML_BEFORE = re.compile(r"\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE(?:[^\[>]|\[.*?\]\s*(?=>))*>", re.S)
 _XML_ELEMENT = re.compile(r"<(?:[\w.-]+:)?([A-Za-z_][\w.-]*)")

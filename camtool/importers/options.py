@@ -25,8 +25,9 @@ FORMATS = ("dxf", "svg", "points", "solid", "bitmap", "board")
 """Names of the formats, each with a package of that name beside this file."""
 
 SUFFIXES = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
-"""The extensions by which a folder is searched for drawings. Lists of points and scripts share
-theirs with other files, so that they must be named or matched by a pattern."""
+"""The extensions by which a folder is searched for drawings. Lists of points, scripts,
+pictures and files of boards share theirs with other files, so that they must be named or matched
+by a pattern."""
 
 TEXTS = ("skip", "outline", "stroke")
 """The treatment of text: skipped, as outlines of its font, or as lines of an engraving font."""

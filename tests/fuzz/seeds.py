@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -110,6 +111,11 @@ def _sample(name: str) -> Callable[[], bytes]:
     return (SAMPLES / name).read_bytes
 
 
+def _board(name: str) -> Callable[[], bytes]:
+    """Return the function that unpacks a file of the sample's board."""
+    return lambda: zipfile.ZipFile(SAMPLES / "led.zip").read(name)
+
+
 TEXTS: dict[str, Callable[[], bytes]] = {
     "r12.dxf": lambda: dxf("R12"),
     "r2010.dxf": dxf,
@@ -120,12 +126,29 @@ TEXTS: dict[str, Callable[[], bytes]] = {
     "decimal.csv": lambda: CSV,
     "points.json": lambda: json.dumps([[[0, 0], [1.5, 2], [3, 0]], [[5, 5], [6, 6]]]).encode(),
     "router.m": lambda: ROUTER,
+    "copper.gtl": _board("led-F_Cu.gtl"),
+    "edge.gm1": _board("led-Edge_Cuts.gm1"),
+    "holes.drl": _board("led.drl"),
 }
 """Seeds that consist of lines."""
+
+
+def png() -> bytes:
+    """A dark square on white."""
+    from PIL import Image
+
+    picture = Image.new("L", (24, 20), 255)
+    picture.paste(0, (6, 5, 18, 15))
+    file = io.BytesIO()
+    picture.save(file, "PNG", dpi=(96, 96))
+    return file.getvalue()
+
 
 BINARIES: dict[str, Callable[[], bytes]] = {
     "binary.dxf": lambda: dxf("R2010", binary=True),
     "array.npy": numpy_file,
     "arrays.npz": numpy_archive,
+    "led.zip": _sample("led.zip"),
+    "square.png": png,
 }
 """Seeds that do not."""

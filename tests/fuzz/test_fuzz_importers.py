@@ -1,12 +1,14 @@
 """Damaged drawings: a drawing or a clear error in bounded time, never anything else."""
 
 from functools import cache
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import CamtoolError
+from camtool.importers.formats import find_format
 from camtool.importers.options import FORMATS, ReadOptions
 from tests.fuzz.damage import EVERY, Damage, cut, flip, headless
 from tests.fuzz.reading import read_or_refuse
@@ -21,6 +23,11 @@ CHOICES = st.integers(0, 2**20)
 EVERYTHING = {"text": "stroke", "dimensions": True, "recognise_arcs": True, "across_layers": True}
 
 
+def options_for(name: str) -> ReadOptions:
+    """Return options by which the seed can be read: a picture has the size that it says."""
+    return ReadOptions(own_dpi=name.endswith(".png"))
+
+
 @cache
 def seed(name: str) -> bytes:
     return SEEDS[name]()
@@ -28,7 +35,7 @@ def seed(name: str) -> bytes:
 
 @pytest.mark.parametrize("name", SEEDS)
 def test_each_seed_is_whole(name: str) -> None:
-    drawing = read_or_refuse(seed(name), name, ReadOptions())
+    drawing = read_or_refuse(seed(name), name, options_for(name))
     assert not isinstance(drawing, CamtoolError), str(drawing)
 
 
@@ -52,13 +59,19 @@ def test_damaged_texts(name: str, hits: list[tuple[Damage, int, int]], everythin
 @examples(40)
 def test_damaged_binaries(name: str, damage: Damage, at: int, choice: int) -> None:
     with no_chewing():
-        read_or_refuse(damage(seed(name), at, choice), name, ReadOptions())
+        read_or_refuse(damage(seed(name), at, choice), name, options_for(name))
 
 
-@given(data=st.binary(max_size=200), form=st.sampled_from([None, *FORMATS]))
-def test_any_bytes_as_any_format(data: bytes, form: str | None) -> None:
-    if form == "solid":  # tried on whole seeds only: each attempt takes a second
-        form = None
+def test_each_format_has_a_seed() -> None:
+    """But for solids: each attempt takes a second, so `tests/importers` tries a few."""
+    formats = {find_format(seed(name), Path(name).suffix, name) for name in SEEDS}
+    assert formats == {*FORMATS} - {"solid"}
+
+
+@pytest.mark.parametrize("form", [None, *(each for each in FORMATS if each != "solid")])
+@given(data=st.binary(max_size=200))
+@examples(40)
+def test_any_bytes_as_any_format(form: str | None, data: bytes) -> None:
     with no_chewing():
         read_or_refuse(data, "noise", ReadOptions(format=form))
 
@@ -73,3 +86,10 @@ def test_damaged_a_thousand_times(name: str, hits: list[tuple[Damage, int, int]]
         data = damage(data, at, choice)
     with no_chewing():
         read_or_refuse(data, name, ReadOptions(**EVERYTHING))
+
+
+@pytest.mark.parametrize("blank", [" ", "\n", "\r\n", "%\n", ";\n", "/\n", "N1 ", "/* */ "])
+def test_many_blanks_take_no_time(blank: str) -> None:
+    """Patterns whose time grows with a power of the blanks, or doubles with each, hang here."""
+    with no_chewing():
+        read_or_refuse((blank * 2000 + "\x01").encode(), "noise", ReadOptions())

@@ -52,6 +52,10 @@ SPECK_MM = 1e-4
 MAX_PRIMITIVES = 400_000
 """Apertures and strokes of one file; uniting this many takes about a minute."""
 
+MAX_BOARD_MM = 10_000.0
+"""Numbers above this are faults of a file: the arcs of its areas could not be divided within
+FLAT_MM."""
+
 MAX_UNPACKED_BYTES = 200_000_000
 
 _LAYERS = (
@@ -71,6 +75,10 @@ _HARMLESS = "zero-size aperture|[Dd]eprecated"
 """Warnings of gerbonara about files that it draws correctly all the same."""
 
 MAX_REMARK = 120
+
+
+_DAMAGED = (zipfile.BadZipFile, RuntimeError, NotImplementedError, ValueError, OSError, EOFError)
+"""What zipfile raises where an entry cannot be unpacked."""
 
 
 class _Part(Struct):
@@ -113,7 +121,11 @@ def _parts(data: bytes, file: str, skipped: list[Skipped]) -> list[_Part]:
     if not data.startswith(b"PK"):
         return [_Part("", _layer_by_name(file) or "GERBER", _text(data))]
     parts, total = [], 0
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+    except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+        raise DrawingError(f"is a damaged ZIP archive ({error})", file=file) from error
+    with archive:
         for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
             if entry.is_dir():
                 continue
@@ -124,7 +136,7 @@ def _parts(data: bytes, file: str, skipped: list[Skipped]) -> list[_Part]:
                 )
             try:
                 text = _text(archive.read(entry))
-            except (zipfile.BadZipFile, RuntimeError, NotImplementedError) as error:
+            except _DAMAGED as error:
                 raise DrawingError(
                     f"cannot be unpacked ({error})", file=file, where=entry.filename
                 ) from error
@@ -195,12 +207,33 @@ def _pieces(part: _Part, file: str, skipped: list[Skipped]) -> list[Piece]:
             skipped.append(Skipped("statement", count, text))
     if sum(len(each) for each, _ in objects) > MAX_PRIMITIVES:
         raise DrawingError(f"has more than {MAX_PRIMITIVES} apertures and strokes", file=file)
+    for primitive in (primitive for primitives, _ in objects for primitive in primitives):
+        if not all(abs(number) <= MAX_BOARD_MM for number in _numbers(primitive)):
+            raise DrawingError(
+                f"has a number above {MAX_BOARD_MM / 1e3:g} m",
+                file=file,
+                where=part.name or None,
+                mend="look for a missing point or a wrong number format (%FS, METRIC)",
+            )
     if drills:
         return list(_holes(objects, part))
     layer = _layer_by_function(part.text) or part.layer
     if layer == "OUTLINE":
         return list(_centre_lines(objects, layer))
     return list(_areas(objects, layer))
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    """Yield all numbers of a primitive of gerbonara: its coordinates and sizes, and those of the
+    points and centres of a contour."""
+    if isinstance(value, int | float):
+        yield value
+    elif isinstance(value, list | tuple):
+        for each in value:
+            yield from _numbers(each)
+    elif value is not None:
+        for each in vars(value).values():
+            yield from _numbers(each)
 
 
 def _remark(text: str) -> str:
