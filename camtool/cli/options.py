@@ -711,12 +711,21 @@ def job_options(command: Command) -> Command:
     return decorate(gather("job", make_flags, names)(command), options)
 
 
+MAX_CHOICES_SHOWN = 100
+"""Characters of the choices of a flag, up to which they stand in its own column of the help, which
+click never breaks; longer ones stand in its sentence."""
+
+
 def _key_flag(section: str, name: str, key: Key) -> Option:
     """Return the flag of a key of job files; its value is None unless given, so that defaults
     apply."""
     settings: dict[str, Any] = {"is_flag": True, "default": None}
+    text = key.help
     if key.value.choices:
         settings = {"type": click.Choice(key.value.choices)}
+        if len("|".join(key.value.choices)) > MAX_CHOICES_SHOWN:
+            settings["metavar"] = name.upper()
+            text += f" One of {', '.join(key.value.choices)}."
     elif key.value.metavar:
         settings = {"metavar": key.value.metavar}
-    return option(section, flag_name(name), name, help=key.help, **settings)
+    return option(section, flag_name(name), name, help=text, **settings)

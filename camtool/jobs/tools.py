@@ -323,9 +323,10 @@ def _number_of(keys: Table) -> int | None:
 
 def _tool(name: str, keys: Table, kind: str) -> Tool:
     """Return the Tool record of these keys. A tool with a tip angle but no kind is a drill for
-    operations that peck, else a V bit."""
+    operations that peck and need no V bit, else a V bit."""
     if "tip_angle" in keys.given and "kind" not in keys.given:
-        drills = bool(kind) and kind_named(kind).descent == "pecks"
+        contract = kind_named(kind) if kind else None
+        drills = contract and contract.descent == "pecks" and not contract.needs_v_bit
         meant = Given("drill" if drills else "v", keys.where, keys.file)
         keys = Table({**keys.given, "kind": meant}, keys.where, keys.file)
     tool = record_of(Tool, TOOL, keys)

@@ -156,7 +156,9 @@ def circles_of(chosen: Chosen) -> tuple[list[Hole], list[str]]:
 
 def largest_hole_mm(operation: Operation) -> float:
     """Return the largest diameter of circles that an operation drills, mm; inf for a drill without
-    width."""
+    width, and for a kind that has no key `max_hole`."""
+    if "max_hole" not in operation.contract.keys:
+        return math.inf
     if operation.max_hole_mm is not None:
         return operation.max_hole_mm
     return operation.tool.diameter_mm or math.inf

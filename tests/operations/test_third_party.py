@@ -37,6 +37,36 @@ def install(source: Path, place: Path, texts: dict[str, str]) -> None:
     pip_install(source, place)
 
 
+SPOT_RECORD = """
+from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, OperationKind
+
+PERFORATE = OperationKind(
+    name="perforate",
+    work="camtool_perforate.work:spot",
+    keys=(*COMMON_KEYS, *SELECTING_KEYS, "depth"),
+    takes="holes",
+    cuts="at",
+    descent="pecks",
+    needs_v_bit=True,
+    cut_name="hole",
+)
+"""
+SPOT_WORK = """
+import numpy as np
+from camtool.planning.holes import drilled_holes, pecks
+from camtool.planning.items import CutRun, Fixed, Work
+
+
+def spot(chosen, setting):
+    items = []
+    for hole in drilled_holes(chosen, setting.operation)[0]:
+        vertices, feeds = pecks(hole.at_mm, [-setting.levels_mm[-1]], setting)
+        run = CutRun(vertices, np.array(feeds), setting.feeds.plunge_mm_min, hole.name)
+        items.append(Fixed((run,), setting, hole.name, hole.source, hole.outline))
+    return Work(tuple(items))
+"""
+"""A kind that marks holes of any size with a V bit."""
+
 TEXTS = {name: listing(f"The {part}") for part, name in PARTS.items()}
 
 
@@ -63,6 +93,15 @@ def broken(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("place")
     record = TEXTS["__init__.py"].replace('cuts="at"', 'cuts="up"')
     install(tmp_path_factory.mktemp("source"), place, {**TEXTS, "__init__.py": record})
+    return place
+
+
+@pytest.fixture(scope="module")
+def spotting(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same, with a kind that marks holes with a V bit."""
+    place = tmp_path_factory.mktemp("place")
+    texts = {**TEXTS, "__init__.py": SPOT_RECORD, "work.py": SPOT_WORK}
+    install(tmp_path_factory.mktemp("source"), place, texts)
     return place
 
 
@@ -141,3 +180,22 @@ def test_a_broken_one_harms_no_other(broken: Path, drawing: str, tmp_path: Path)
     assert done.returncode == 2
     assert "'up' is none of beside, within, along, at, over" in done.stderr
     assert camtool(broken, tmp_path, "post", drawing, *flags, "--kind", "engrave").returncode == 0
+
+
+def test_a_v_bit_marks_circles_wider_than_itself(spotting: Path, tmp_path: Path) -> None:
+    """The kind has no key `max_hole`, and its tool with a tip angle is a V bit, not a drill."""
+    document = ezdxf.new(units=ezdxf.units.MM)
+    for x in (0.0, 10.0):
+        document.modelspace().add_circle((x, 0.0), 1.5)
+    document.saveas(tmp_path / "holes.dxf")
+    job = (
+        '[tools.bit]\ndiameter = "1.2mm"\ntip_angle = 90\n'
+        '[stock]\nthickness = "6mm"\nsize = ["30mm", "20mm"]\ncorner = ["-10mm", "-10mm"]\n'
+        '[[operations]]\nname = "marks"\nkind = "perforate"\ntool = "bit"\ndepth = "0.5mm"\n'
+    )
+    (tmp_path / "job.toml").write_text(job, encoding="utf-8")
+    flags = ("--target", "grbl", "--spindle", "9000", "--job", "job.toml", "-o", "a.nc")
+    done = camtool(spotting, tmp_path, "post", "holes.dxf", *flags)
+    assert done.returncode == 0, done.stderr
+    assert sorted(holes(tmp_path / "a.nc")) == [0.0, 10.0]
+    assert "CUT_TOO_DEEP" not in done.stderr
