@@ -209,8 +209,9 @@ def _cleared(
         connected, runs = ConnectedRegion(part), list[CutRun]()
         for path, region in clearing_paths(part, setting.operation):
             way_down = down_for(path, region, connected, setting)
-            runs += lowered_runs(path, way_down, over_floor(connected), setting, each.name)
-            changed_runs.setdefault(way_down.changed, runs[0])
+            lowered = lowered_runs(path, way_down, over_floor(connected), setting, each.name)
+            changed_runs.setdefault(way_down.changed, lowered[0])
+            runs += lowered
         groups.append(runs)
     for path in slots:
         way_down = down_for(path, None, None, setting)
