@@ -28,6 +28,9 @@ HEAVY = {
     "svgpathtools",
 }
 PIC = ("--target", "pic-mmh", "-q")
+MAX_STACK = 24
+"""Functions of camtool that call each other, one within the other, in `post` of the logo. Whoever
+adds a layer that only passes on takes another one out."""
 
 
 def modules_of(*arguments: str) -> set[str]:
@@ -75,6 +78,24 @@ def test_post_of_points(tmp_path: Path) -> None:
     output = str(tmp_path / "star.m")
     loaded = loaded_heavy("post", "samples/star.csv", "-t", "matlab-router", "-q", "-o", output)
     assert loaded <= {"numpy"}
+
+
+def test_few_functions_stand_within_each_other(output: str) -> None:
+    code = (
+        "import sys; sys.argv = ['camtool', *sys.argv[1:]]; deepest = depth = 0\n"
+        "def watch(frame, event, _):\n"
+        "    global deepest, depth\n"
+        "    if frame.f_globals.get('__name__', '').startswith('camtool'):\n"
+        "        depth += {'call': 1, 'return': -1}.get(event, 0)\n"
+        "        deepest = max(deepest, depth)\n"
+        "from camtool.cli.main import main\n"
+        "sys.setprofile(watch)\n"
+        "try: main()\n"
+        "finally: sys.setprofile(None); print('DEEPEST', deepest)"
+    )
+    command = [sys.executable, "-c", code, "post", "samples/logo.dxf", *PIC, "-o", output]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
+    assert 15 < int(result.stdout.rpartition("DEEPEST")[2]) <= MAX_STACK
 
 
 def test_what_is_loaded_is_seen() -> None:
