@@ -31,7 +31,10 @@ def at_a_port(twin: Twin) -> Iterator[str]:
     """The port at which a machine answers as fast as it can, until the first client has gone."""
     port = PseudoTerminal()
     serving = threading.Thread(
-        target=serve, args=(WiredTwin(twin), port, Clock(None)), kwargs={"once": True}, daemon=True
+        target=serve,
+        args=(WiredTwin(twin), port, Clock(None)),
+        kwargs={"ends_with_client": True},
+        daemon=True,
     )
     serving.start()
     try:

@@ -76,7 +76,7 @@ def same(slaves: list[Slave], orders: list[list[tuple[int, int]]], pauses: list[
     np.add.at(steps, rows, np.abs(np.diff(found, axis=0, prepend=[start])))
     assert account.steps.tolist() == steps.tolist()
     assert account.ticks == pytest.approx(np.diff(begins), abs=1e-7)
-    assert account.ended.all()
+    assert account.has_ended.all()
 
 
 def three(**changes: float) -> list[Slave]:
@@ -159,7 +159,7 @@ def test_rows_that_nobody_samples(seed: int, chunk: int) -> None:
     some, some_rows, account = filled(three(friction=friction), orders, pauses, 0.08, chunk, thin)
     assert np.array_equal(account.steps, every.steps)
     assert np.array_equal(account.ticks, every.ticks)
-    assert np.array_equal(account.ended, every.ended)
+    assert np.array_equal(account.has_ended, every.has_ended)
     assert np.array_equal(account.samples, every.samples)
     assert account.samples.tolist() == np.bincount(rows, minlength=len(orders)).tolist()
     for row, is_thin in enumerate(thin.tolist()):
@@ -272,5 +272,5 @@ def test_a_loop_that_never_gets_there_is_given_up() -> None:
     )
     out, row = np.empty((1000, 3), np.int64), np.empty(1000, np.int64)
     number, over = slaves_fill(program, state, account, out, row)
-    assert (number, over, bool(account.ended[0])) == (53, True, False)
+    assert (number, over, bool(account.has_ended[0])) == (53, True, False)
     assert out[:number].tolist() == [[0, 0, 0]] * number
