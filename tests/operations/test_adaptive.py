@@ -14,16 +14,14 @@ from hypothesis import strategies as st
 
 import camtool
 from camtool.errors import OptionError
-from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import Polyline, Polylines
-from camtool.planning.adaptive import adaptive_legs
+from camtool.geometry.polylines import Polyline
+from camtool.planning.adaptive import Pose, corner_ratio, ends_of, step_for, tangent_link
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry, Job, Operation, Tool
 from camtool.planning.strategies import engagement
-from camtool.planning.strokes import Pose, corner_ratio, ends_of, step_for, tangent_link
 from camtool.progress import Progress
 from tests.operations.adaptive_programs import posted
-from tests.oracles.contours import CIRCLE, SQUARE, closed, star
+from tests.oracles.contours import CIRCLE, SQUARE, closed
 from tests.oracles.engaged import chords_of, greatest_engagement
 from tests.oracles.swept import complaints
 from tests.paths import mirrored, moved, scaled
@@ -281,28 +279,8 @@ def test_the_limit_is_proved_on_the_predicted_slides(tmp_path: Path) -> None:
     assert "ENGAGEMENT_TOO_HIGH" in names[1]
 
 
-@pytest.mark.parametrize(
-    ("path", "tool_mm", "is_pursued"), [(SQUARE, 0.65, True), (star(5, 4.0, 10.0), 2.0, False)]
-)
-def test_a_pursuit_that_leaves_much_is_given_up(
-    path: Polyline, tool_mm: float, is_pursued: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In a star the first arcs of the points are not reached: fronts clear all of it, as they do
-    where nothing is pursued."""
-    region, limit = offset_shape(region_of([path]), tool_mm), math.acos(1.0 - 2.0 * 0.2)
-    plan = adaptive_legs(region, 0.5 * tool_mm, tool_mm, limit)
-    monkeypatch.setattr("camtool.planning.adaptive.PURSUED_ROOM_SHARE", math.inf)
-    fronts = adaptive_legs(region, 0.5 * tool_mm, tool_mm, limit)
-    legs, legs_of_fronts = (
-        [leg.vertices.tolist() for stay in each.stays for leg in stay] for each in (plan, fronts)
-    )
-    assert (legs != legs_of_fronts) == is_pursued
-
-
-@pytest.mark.parametrize(("has_air", "parts"), [(False, ["strokes"]), (True, ["fronts", "links"])])
-def test_planning_tells_which_share_is_cleared_and_linked(has_air: bool, parts: list[str]) -> None:
-    """Each part of the stage grows, and ends at all; then the stage is that of before. Pockets
-    that begin in air are cleared by fronts."""
+def test_planning_tells_which_share_is_cleared_and_linked() -> None:
+    """Both parts of the stage grow, and end at all; then the stage is that of before."""
     told: list[tuple[str, float]] = []
 
     class Told(Progress):
@@ -313,16 +291,12 @@ def test_planning_tells_which_share_is_cleared_and_linked(has_air: bool, parts: 
 
     progress = Told()
     progress.begin("planning")
-    limit = math.acos(1.0 - 2.0 * 0.2)
-    if has_air:
-        region = offset_shape(region_of([SQUARE]), 0.65)
-        air = Polylines.of([moved(SQUARE, 9.0, 0.0)])
-        adaptive_legs(region, 0.3, 0.65, limit, air)
-    else:
-        adaptive(QUICK["square"], 1.3, limit)
-    stages = [f"planning – {part}" for part in parts]
-    assert list(dict.fromkeys(stage for stage, _ in told)) == stages
-    for part in parts:
+    adaptive(QUICK["square"], 1.3, math.acos(1.0 - 2.0 * 0.2))
+    assert list(dict.fromkeys(stage for stage, _ in told)) == [
+        "planning – fronts",
+        "planning – links",
+    ]
+    for part in ("fronts", "links"):
         shares = [share for stage, share in told if stage.endswith(part)]
         assert shares == sorted(shares)
         assert len(set(shares)) > 5

@@ -124,7 +124,7 @@ PLATE = [box(0, 0, 30, 20), box(14, 8, 18, 12)]
 
 @pytest.mark.parametrize(
     ("paths", "wide"),
-    [([box(0, 0, 30, 22), box(13, 9, 17, 13)], {}), ([box(0, 0, 28, 18)], {"own": OWN})],
+    [(PLATE, {}), ([box(0, 0, 28, 18)], {"own": OWN})],
     ids=["passes", "adaptive"],
 )
 def test_behind_a_wider_tool_only_the_rest_is_cut(
