@@ -204,7 +204,7 @@ def _is_board_archive(data: bytes) -> bool:
                     head = text_head(file.read(HEAD_BYTES))
                 if is_gerber(head) or is_excellon(head):
                     return True
-    except (zipfile.BadZipFile, RuntimeError, NotImplementedError, OSError, ValueError):
+    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError):
         return False  # what it is instead, the caller says
     return False
 

@@ -9,6 +9,7 @@ import os
 import shutil
 import subprocess
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -289,6 +290,21 @@ def test_an_archive_that_unpacks_to_too_much_is_refused(monkeypatch: pytest.Monk
     data = packed({"a.gtl": PAD, "z.gbl": PAD + b" " * 2000})
     with pytest.raises(DrawingError, match="unpacks to more than"):
         read_bytes(data, "board.zip")
+
+
+def test_damaged_archives_are_refused_in_a_line() -> None:
+    """Bytes of the packed text, and of the directory at the end, in turn."""
+    data = packed({"a.gtl": PAD * 40})
+    for at_byte in range(4, len(data)):
+        damaged = data[:at_byte] + bytes([data[at_byte] ^ 0xFF]) + data[at_byte + 1 :]
+        with suppress(DrawingError):
+            read_bytes(damaged, "board.zip")
+
+
+def test_numbers_beyond_any_board_are_refused() -> None:
+    data = gerber(f"%ADD10C,1e9*%\nD10*\n{at(1, 1)}D03*\n")
+    with pytest.raises(DrawingError, match="above 10 m"):
+        read_bytes(data, "any.gbr")
 
 
 def test_without_the_extra_the_mend_is_its_name(monkeypatch: pytest.MonkeyPatch) -> None:

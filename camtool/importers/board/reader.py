@@ -17,6 +17,7 @@ import math
 import re
 import warnings
 import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
@@ -77,7 +78,15 @@ _HARMLESS = "zero-size aperture|[Dd]eprecated"
 MAX_REMARK = 120
 
 
-_DAMAGED = (zipfile.BadZipFile, RuntimeError, NotImplementedError, ValueError, OSError, EOFError)
+_DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    RuntimeError,
+    NotImplementedError,
+    ValueError,
+    OSError,
+    EOFError,
+)
 """What zipfile raises where an entry cannot be unpacked."""
 
 
