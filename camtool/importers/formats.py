@@ -193,6 +193,22 @@ def is_excellon(head: str) -> bool:
     return _EXCELLON_START.match(head) is not None
 
 
+def zip_faults() -> tuple[type[Exception], ...]:
+    """Return the exceptions of zipfile for a bad archive, a password, an unknown compression, and
+    damaged data. DrawingError is a ValueError, and so one of them."""
+    import zipfile
+
+    return (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        OSError,
+        OverflowError,
+        RuntimeError,
+        ValueError,
+    )
+
+
 def _is_board_archive(data: bytes) -> bool:
     """Return True if a ZIP archive holds a Gerber or Excellon file."""
     import zipfile
@@ -204,7 +220,7 @@ def _is_board_archive(data: bytes) -> bool:
                     head = text_head(file.read(HEAD_BYTES))
                 if is_gerber(head) or is_excellon(head):
                     return True
-    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError):
+    except zip_faults():
         return False  # what it is instead, the caller says
     return False
 

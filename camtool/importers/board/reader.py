@@ -17,7 +17,6 @@ import math
 import re
 import warnings
 import zipfile
-import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
@@ -34,7 +33,7 @@ from camtool.geometry.fit import arc_vertices
 from camtool.geometry.polylines import Polyline
 from camtool.geometry.simplify import recognise_arcs
 from camtool.importers.assemble import assemble
-from camtool.importers.formats import is_excellon, is_gerber
+from camtool.importers.formats import is_excellon, is_gerber, zip_faults
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import Piece
 
@@ -76,18 +75,6 @@ _HARMLESS = "zero-size aperture|[Dd]eprecated"
 """Warnings of gerbonara about files that it draws correctly all the same."""
 
 MAX_REMARK = 120
-
-
-_DAMAGED = (
-    zipfile.BadZipFile,
-    zlib.error,
-    RuntimeError,
-    NotImplementedError,
-    ValueError,
-    OSError,
-    EOFError,
-)
-"""What zipfile raises where an entry cannot be unpacked."""
 
 
 class _Part(Struct):
@@ -132,7 +119,7 @@ def _parts(data: bytes, file: str, skipped: list[Skipped]) -> list[_Part]:
     parts, total = [], 0
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
-    except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+    except zip_faults() as error:
         raise DrawingError(f"is a damaged ZIP archive ({error})", file=file) from error
     with archive:
         for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
@@ -145,7 +132,7 @@ def _parts(data: bytes, file: str, skipped: list[Skipped]) -> list[_Part]:
                 )
             try:
                 text = _text(archive.read(entry))
-            except _DAMAGED as error:
+            except zip_faults() as error:
                 raise DrawingError(
                     f"cannot be unpacked ({error})", file=file, where=entry.filename
                 ) from error

@@ -6,7 +6,6 @@ import io
 import math
 import re
 import warnings
-import zlib
 from array import array
 from collections.abc import Iterator
 from typing import Any, NoReturn
@@ -16,6 +15,7 @@ from msgspec import Struct, field
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
+from camtool.importers.formats import zip_faults
 from camtool.units import MM_PER_UNIT
 
 COLUMNS = (2, 3)
@@ -481,10 +481,7 @@ def parse_npz(data: bytes, file: str) -> PointTable:
                     )
                 points = _array(content, file, layer)
                 strokes.append(Stroke(points, f"of array {layer}", layer=layer))
-    # zipfile raises these for a bad archive, a password, an unknown compression, damaged data.
-    except (zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError, OSError) as error:
-        raise _broken(file, error) from error
-    except (zlib.error, ValueError, OverflowError) as error:
+    except zip_faults() as error:
         if isinstance(error, DrawingError):
             raise
         raise _broken(file, error) from error
