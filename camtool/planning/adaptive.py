@@ -34,6 +34,7 @@ from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import OptionError
+from camtool.geometry.boxes import IndexedCurves
 from camtool.geometry.curves import FunctionCurve
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.fit import fit_curve
@@ -49,6 +50,7 @@ from camtool.geometry.nesting import inside
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.kernels.engagement import Cleared
+from camtool.kernels.offsets import insides, meetings_of, pairs_of
 from camtool.planning.clearing import outside_parts, parts_of, pole
 from camtool.planning.items import CutRun, Setting
 from camtool.planning.job import Operation
@@ -136,11 +138,8 @@ tool's where that is less."""
 AIR_THICK_SHARE = 0.02
 """Chips thinner than this part of the tool's radius do not count there."""
 
-PLACES_SHARE = 0.02
-"""Links are held against the walls at places no farther apart than this part of the radius, ..."""
-
 WALL_SHARE = 1e-4
-"""... and leave them by no more than this part of it."""
+"""Links leave the region of tool centres by no more than this part of the tool's radius."""
 
 TRIED_STROKES = 4
 """So many strokes are tried before the tool comes up."""
@@ -442,6 +441,7 @@ class _Clearing:
         extents = np.stack([boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)])
         self.cleared = Cleared(extents, tool_mm, np.array([-np.inf, -np.inf, np.inf, np.inf]))
         self.border = Segments.of(offset_shape(region, -WALL_SHARE * tool_mm))
+        self.border_curves = IndexedCurves.of(self.border, margin_mm=POSITION_EPS_MM)
 
     def take(self, strokes: list[FrontStroke]) -> None:
         """Take the strokes that are to be put in order."""
@@ -478,8 +478,7 @@ class _Clearing:
     def is_clear(self, vertices: Floats, share: float = AIR_SHARE) -> bool:
         """Return True if the tool is engaged by this share of the limit at most along a path,
         and stays in the region."""
-        places = sample(Polyline(vertices), PLACES_SHARE * self.tool_mm)
-        if not inside(places, self.border).all():
+        if not self.is_in_region(vertices):
             return False
         limit, thick = share * self.limit, AIR_THICK_SHARE * self.tool_mm
         moves = self.moves(vertices, AIR_THICK_SHARE)
@@ -490,6 +489,16 @@ class _Clearing:
             if angles.max() > limit:
                 return False
         return True
+
+    def is_in_region(self, vertices: Floats) -> bool:
+        """Return True if an open path (n, 3) lies in the region: it begins there, and none of its
+        lines and arcs meets the border."""
+        path, border = IndexedCurves.of(Segments.of(Polyline(vertices))), self.border_curves
+        pairs = pairs_of(path.boxes, path.tree, border.boxes, border.tree, False)
+        if len(meetings_of(path.rows, border.rows, pairs, POSITION_EPS_MM)[0]):
+            return False
+        start = np.ascontiguousarray(vertices[:1, :2])
+        return bool(insides(start, border.rows, self.border.bulge, border.tree)[0])
 
     def legs(self, first: Floats | None) -> Iterator[list[Leg]]:
         """Yield the legs of each stay of the tool in the stock: the first begins with a path, or

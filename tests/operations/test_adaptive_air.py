@@ -13,7 +13,7 @@ import camtool
 from camtool.geometry.measure import length
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polyline, Polylines, rotate
-from camtool.planning.adaptive import adaptive_legs, mirrored
+from camtool.planning.adaptive import _Clearing, adaptive_legs, mirrored
 from camtool.planning.findings import PlanningCode
 from camtool.planning.items import CutRun, Step
 from camtool.planning.job import Entry, Job, Operation, Stock, Tool
@@ -110,6 +110,38 @@ def test_the_tool_comes_from_beside_the_stock(name: str, direction: str) -> None
 def test_open_pockets_of_all_kinds(name: str) -> None:
     (step,) = steps_of(OPEN[name], adaptive(), stock=STOCK)
     check(list(step.runs), OPEN[name], beside(STOCK))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("high", [12.5, 20.0])
+def test_pockets_that_overhang_by_just_a_tool_are_not_cut_too_wide(high: float) -> None:
+    """Links there have radii of some hundredths of a millimetre."""
+    paths = [box(30, 8, 43, high)]
+    (step,) = steps_of(paths, adaptive(), stock=STOCK)
+    assert gouges(list(step.runs), region_of(paths), RADIUS) == []
+
+
+@pytest.mark.parametrize("beyond_mm", [-1e-3, 1e-3, 2e-3])
+@pytest.mark.parametrize("turn", [0, 1, 2, 3])
+def test_arcs_that_bulge_out_of_the_region_between_their_ends_are_no_links(
+    turn: int, beyond_mm: float
+) -> None:
+    """Arcs shorter than the steps at which a path would be sampled, at each side of a square."""
+    clearing = _Clearing(Polylines.of([box(0, 0, 10, 10)]), RADIUS, LIMIT)
+    clearing.add_air(Polylines.of([box(-5, -5, 15, 15)]))
+    y = 10.0 + beyond_mm - 0.008
+    link = np.array([[5.0, 9.0, 0.0], [5.0, y, -1.0], [5.016, y, 0.0], [5.016, 9.0, 0.0]])
+    corners = link[:, 0] - 5.0 + 1j * (link[:, 1] - 5.0)
+    turned = corners * 1j**turn
+    link[:, :2] = np.column_stack([turned.real, turned.imag]) + 5.0
+    assert clearing.is_clear(link) == (beyond_mm < 0.0)
+
+
+def test_links_begin_within_the_region() -> None:
+    clearing = _Clearing(Polylines.of([box(0, 0, 10, 10), box(3, 3, 6, 6)]), RADIUS, LIMIT)
+    clearing.add_air(Polylines.of([box(-5, -5, 15, 15)]))
+    for x, is_clear in ((1.0, True), (4.0, False), (12.0, False)):
+        assert clearing.is_clear(np.array([[x, 4.0, 0.1], [x, 5.0, 0.0]])) == is_clear
 
 
 def test_without_a_place_beside_the_stock_it_begins_with_a_helix() -> None:
