@@ -19,7 +19,8 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
 from camtool.geometry.curves import Curve, Pieced, Pieces
-from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM
+from camtool.geometry.measure import Frames, point_at
+from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM, Polyline, Segments
 from camtool.kernels.fits import (
     ASIDE_FROM,
     ASIDE_TO,
@@ -90,6 +91,34 @@ def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:
     return _fit_any(curve, tolerance_mm)
 
 
+def fit_path(path: Polyline, tolerance_mm: float) -> Fit:
+    """Return arcs and lines, fewer where that can be, within `tolerance_mm` of an open path whose
+    segments have tangents in common where they join."""
+    segments = Segments.of(path)
+    frames = Frames.of(segments)
+    turning = np.ceil(np.abs(segments.sweep) / STEP_TURN_RAD)
+
+    def nodes(_: float, steps: int) -> Nodes:
+        counts = np.maximum(turning, math.ceil(steps / len(segments))).astype(np.int64)
+        row = np.repeat(np.arange(len(segments)), counts)
+        share = (np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[row]
+        tangents = frames[row].tangent_at(share)
+        last = frames[np.array([len(segments) - 1])].tangent_at(np.ones(1))
+        tangents = np.concatenate([tangents, last])
+        points = np.concatenate([point_at(segments, row, share), path.end[None, :]])
+        is_end = np.zeros(len(points), dtype=np.bool_)
+        is_end[[0, -1]] = True
+        return Nodes(np.append(row + share, len(segments)), points, tangents, tangents, is_end)
+
+    def samples(t: Floats) -> Floats:
+        every = _steps_between(t)
+        row = np.minimum(every.astype(np.int64), len(segments) - 1)
+        return point_at(segments, row, every - row)
+
+    vertices, deviations, _ = _fitted(nodes, samples, tolerance_mm)
+    return _checked_fit(vertices, deviations, np.stack([path.start, path.end]))
+
+
 def arc_vertices(centre: Floats, radius: float, start_rad: float, sweep_rad: float) -> Floats:
     """Return an arc as vertices (n, 3), the last one its end (bulge 0); CCW when the sweep is
     positive.
@@ -148,18 +177,21 @@ def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
 
 def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
     """Return the fit of any other curve, which gives points and tangents."""
-    share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
-
-    def samples(t: Floats) -> Floats:
-        parameters = (t[:-1, None] + share * np.diff(t)[:, None]).ravel()
-        return curve.point(np.append(parameters, t[-1]))
-
     vertices, deviations, nodes = _fitted(
-        lambda fineness_mm, steps: curve_nodes(curve, fineness_mm, steps), samples, tolerance_mm
+        lambda fineness_mm, steps: curve_nodes(curve, fineness_mm, steps),
+        lambda t: curve.point(_steps_between(t)),
+        tolerance_mm,
     )
     if len(nodes) == 1:
         return Fit(vertices, *deviations)
     return _checked_fit(vertices, deviations, nodes.point[[0, -1]])
+
+
+def _steps_between(t: Floats) -> Floats:
+    """Return `MEASURE_STEPS` parameters from each of these (n,) on towards the next one, and the
+    last one."""
+    share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
+    return np.append((t[:-1, None] + share * np.diff(t)[:, None]).ravel(), t[-1])
 
 
 def _fitted(

@@ -440,6 +440,9 @@ class Mitres(Struct, frozen=True, eq=False):
     @classmethod
     def about(cls, corners: Corners, rows: Ints, offset: Offset) -> Mitres:
         """Return the mitres at the outer corners with these rows; the other corners have none."""
+        if len(rows) == 0:
+            count = len(corners.turn)
+            return cls(np.zeros(count), np.zeros(count, dtype=np.bool_), np.empty((0, 10)))
         half, d = -0.5 * corners.turn[rows], offset.distance_mm
         is_cut = offset.limit * np.cos(half) < 1.0
         reach, cut = np.zeros(len(corners.turn)), np.zeros(len(corners.turn), dtype=np.bool_)
@@ -458,6 +461,9 @@ class Mitres(Struct, frozen=True, eq=False):
 
         They go on from a shifted arc, across where the mitre is cut off, and on to a shifted arc.
         `is_arc` (K, 2) is true if the segment before, or after, each corner is an arc."""
+        if not self.reach.any():
+            no_points = np.empty((0, 2))
+            return np.empty(0, np.int64), Segments.between(no_points, no_points, np.empty(0))
         d, reach = offset.distance_mm, self.reach[:, None]
         left_foot = corners.place + d * turn_left(corners.before)
         right = corners.place + d * turn_left(corners.after)

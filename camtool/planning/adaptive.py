@@ -37,7 +37,7 @@ from camtool.errors import OptionError
 from camtool.geometry.boxes import IndexedCurves
 from camtool.geometry.curves import FunctionCurve
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.fit import fit_curve
+from camtool.geometry.fit import fit_curve, fit_path
 from camtool.geometry.measure import (
     Frames,
     length,
@@ -121,6 +121,10 @@ FIT_SHARE = 2e-4
 FIT_OPENINGS = 10.0
 """Strokes are smoothed within this part of the tool's radius, and of so many opening radii where
 that is less; they keep so far from walls."""
+
+SMOOTH_VERTICES, SMOOTH_FITS, SMOOTH_TURN_RAD = 8, 10.0, 1e-4
+"""Strokes of no more vertices than the first, none of them nearer to the next than so many times
+that, stay as they are if no joint turns by more than the angle."""
 
 CORNER_TURN_RAD = 0.02
 """Fronts are cut where they turn towards the stock by more."""
@@ -277,9 +281,9 @@ def fronts(
                 break
             number += 1
             for path in outside_parts(wider, before):
-                for piece in _cut_at_corners(path, tool_mm):
+                for piece, is_smooth in _cut_at_corners(path, tool_mm):
                     fit_mm = FIT_SHARE * min(tool_mm, FIT_OPENINGS * opening)
-                    yield FrontStroke(_smooth(piece, fit_mm), number, opening)
+                    yield FrontStroke(_smooth(piece, is_smooth, fit_mm), number, opening)
             reached = after
             before = _union([reached, holes]) if len(holes) else reached
             cleared_mm2 = float(signed_areas(before).sum()) - first_mm2
@@ -304,27 +308,36 @@ def _within(loops: Polylines, region: Polylines) -> Polylines:
     return loops.select(np.flatnonzero(inside(starts, Segments.of(region))))
 
 
-def _cut_at_corners(path: Polyline, tool_mm: float) -> list[Floats]:
-    """Return (n, 3) the pieces of a path between its corners, in its order; a closed one without
-    corners as one piece that ends where it begins."""
+def _cut_at_corners(path: Polyline, tool_mm: float) -> list[tuple[Floats, bool]]:
+    """Return (n, 3) the pieces of a path between its corners, in its order, and for each True if
+    the path has no joints that turn a little; a closed one without corners as one piece that ends
+    where it begins."""
     along = MeasuredPath.of(path)
-    corners = np.flatnonzero(np.abs(along.turns) > CORNER_TURN_RAD)
+    turns = np.abs(along.turns)
+    corners = np.flatnonzero(turns > CORNER_TURN_RAD)
+    is_smooth = bool(np.delete(turns, corners).max(initial=0.0) < SMOOTH_TURN_RAD)
     marks = along.reach[corners].tolist()
     if not path.closed:
         marks = [0.0, *marks, along.total_mm]
     elif not marks:
-        return [along.piece(0.0, along.total_mm)]
+        return [(along.piece(0.0, along.total_mm), is_smooth)]
     else:
         marks = [*marks, marks[0] + along.total_mm]
     return [
-        along.piece(low, high)
+        (along.piece(low, high), is_smooth)
         for low, high in pairwise(marks)
         if high - low > SPECK_SHARE * tool_mm
     ]
 
 
-def _smooth(piece: Floats, fit_mm: float) -> Floats:
-    """Return (n, 3) the arcs and lines, as few as it needs, of an open path without corners."""
+def _smooth(piece: Floats, is_smooth: bool, fit_mm: float) -> Floats:
+    """Return (n, 3) an open path without corners; where it is not smooth, or has many arcs and
+    lines or short ones, as few of them as it needs."""
+    shortest_mm = float(np.hypot(*np.diff(piece[:, :2], axis=0).T).min())
+    if is_smooth and len(piece) <= SMOOTH_VERTICES and shortest_mm > SMOOTH_FITS * fit_mm:
+        return piece
+    if is_smooth:
+        return fit_path(Polyline(piece), fit_mm).vertices
     along = MeasuredPath.of(Polyline(piece))
     curve = FunctionCurve(along.at, along.directions, np.array([0.0, along.total_mm]))
     return fit_curve(curve, fit_mm).vertices

@@ -16,6 +16,7 @@ import numpy as np
 from msgspec import Struct, field
 
 from camtool.arrays import Bools, Floats, Ints, distinct, distinct_rows
+from camtool.geometry.boxes import IndexedCurves
 from camtool.geometry.distance import nearest, points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import (
@@ -36,7 +37,8 @@ from camtool.geometry.polylines import (
     reverse,
     rotate,
 )
-from camtool.planning.paths import MeasuredPath, join_paths, midpoints, true_ranges
+from camtool.kernels.offsets import TA, meetings_of, pairs_of
+from camtool.planning.paths import MeasuredPath, MeasuredPaths, join_paths, midpoints, true_ranges
 
 SHORTER = (0.95, 0.9, 0.85, 0.8)
 """Shares of the step that are tried in turn where it leaves tips: rings alone make a smoother
@@ -665,22 +667,33 @@ def pole(region: Polylines) -> Floats:
 def outside_parts(lines: Polylines, region: Polylines) -> list[Polyline]:
     """Return the parts of paths that lie outside a region (even-odd): open pieces, or
     whole paths."""
-    border = Segments.of(region)
-    outside_pieces: list[Polyline] = []
-    for path in lines:
-        along = MeasuredPath.of(path)
-        marks = _marks(along, border)
-        outside = ~inside(along.at(0.5 * (marks[1:] + marks[:-1])), border)
-        outside_pieces += _runs(along, marks, outside)
-    return outside_pieces
+    if len(lines) == 0:
+        return []
+    along, border = MeasuredPaths(lines), Segments.of(region)
+    curves, border_curves = (
+        IndexedCurves.of(each, margin_mm=POSITION_EPS_MM) for each in (along.segments, border)
+    )
+    boxes = (curves.boxes, curves.tree, border_curves.boxes, border_curves.tree)
+    rows, places = meetings_of(
+        curves.rows, border_curves.rows, pairs_of(*boxes, False), POSITION_EPS_MM
+    )
+    row = rows[:, 0]
+    number = along.segments.path[row]
+    reach = along.reach[row + number] + places[:, TA] * segment_lengths(along.segments[row])
+    marks = [_marks(path, reach[number == index]) for index, path in enumerate(along)]
+    middles = [path.at(0.5 * (own[1:] + own[:-1])) for path, own in zip(along, marks, strict=True)]
+    outside = ~inside(np.concatenate([np.empty((0, 2)), *middles]), border)
+    begins = np.cumsum([len(own) - 1 for own in marks])[:-1]
+    return [
+        piece
+        for path, own, is_outside in zip(along, marks, np.split(outside, begins), strict=True)
+        for piece in _runs(path, own, is_outside)
+    ]
 
 
-def _marks(along: MeasuredPath, border: Segments) -> Floats:
-    """Return the lengths, ascending, at which a path meets the border, and both its ends."""
-    common = crossings(along.segments, border)
-    lengths = segment_lengths(along.segments)
-    meeting_lengths = along.reach[common.row_a] + common.ta * lengths[common.row_a]
-    every = distinct(np.concatenate([[0.0, along.total_mm], meeting_lengths]))
+def _marks(along: MeasuredPath, lengths: Floats) -> Floats:
+    """Return these lengths along a path, ascending and each once, and both its ends."""
+    every = distinct(np.concatenate([[0.0, along.total_mm], lengths]))
     is_distinct = np.concatenate([[True], np.diff(every) > POSITION_EPS_MM])
     marks: Floats = every[is_distinct]
     marks[-1] = along.total_mm

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from camtool.errors import GeometryError
 from camtool.geometry.curves import BezierCurve, EllipseCurve, FunctionCurve, SplineCurve
-from camtool.geometry.fit import MIN_STEPS, arc_vertices, curve_nodes, fit_curve
+from camtool.geometry.fit import MIN_STEPS, arc_vertices, curve_nodes, fit_curve, fit_path
+from camtool.geometry.measure import sample
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
 from camtool.records import replace
 from tests.drawings import drawing_of
@@ -329,3 +330,26 @@ def test_numbers_that_are_no_curve():
     ):
         with pytest.raises(GeometryError):
             SplineCurve(degree, np.array(knots, dtype=float), np.zeros((2, 2)), weights)
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.01, 4.0), st.integers(-300, 300)), min_size=1, max_size=20),
+    st.floats(1e-4, 0.05),
+)
+def test_a_smooth_path_is_fitted_with_no_more_arcs(
+    pieces: list[tuple[float, int]], tolerance: float
+) -> None:
+    """The path is a chain of tangent arcs and lines of these lengths and sweeps, rad / 100."""
+    rows, at, heading = [], 0j, 0.0
+    for size, hundredths in pieces:
+        sweep = 0.01 * hundredths
+        chord = size if sweep == 0.0 else 2.0 * size / sweep * math.sin(0.5 * sweep)
+        rows.append([at.real, at.imag, math.tan(0.25 * sweep)])
+        at += chord * complex(math.cos(heading + 0.5 * sweep), math.sin(heading + 0.5 * sweep))
+        heading += sweep
+    path = Polyline(np.array([*rows, [at.real, at.imag, 0.0]]))
+    fit = fit_path(path, tolerance)
+    assert len(fit.vertices) <= len(path.vertices) + 2
+    assert np.array_equal(fit.vertices[[0, -1], :2], path.vertices[[0, -1], :2])
+    assert arcs.chain_distances(sample(path, 0.01), fit.vertices).max() <= tolerance
+    assert arcs.kinks(fit.vertices).max(initial=0.0) <= JOINT_ANGLE_RAD
