@@ -26,18 +26,20 @@ from camtool.geometry.offset import swept_outline
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.planning.adaptive import (
     CORNER_TURN_RAD,
-    PLANNED_SHARE,
     AdaptiveStays,
-    Leg,
     adaptive_legs,
+    rest_stays,
+    spiral,
+)
+from camtool.planning.paths import MeasuredPath
+from camtool.planning.strokes import (
+    PLANNED_SHARE,
+    Leg,
     arc_rows,
     ends_of,
     front_step,
-    rest_stays,
-    spiral,
     tangent_link,
 )
-from camtool.planning.paths import MeasuredPath
 
 MAX_STEP_SHARE = 0.7
 """Circles are no farther apart than this part of their radius."""

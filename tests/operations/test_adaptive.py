@@ -14,14 +14,24 @@ from hypothesis import strategies as st
 
 import camtool
 from camtool.errors import OptionError
-from camtool.geometry.polylines import Polyline
-from camtool.planning.adaptive import Pose, corner_ratio, ends_of, step_for, tangent_link
+from camtool.geometry.offset import offset_shape
+from camtool.geometry.polylines import Polyline, Polylines
+from camtool.planning.adaptive import adaptive_legs, spiral
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry, Job, Operation, Tool
+from camtool.planning.pursuing import Approach, Pursued
 from camtool.planning.strategies import engagement
+from camtool.planning.strokes import (
+    Pose,
+    corner_ratio,
+    ends_of,
+    moves_along,
+    step_for,
+    tangent_link,
+)
 from camtool.progress import Progress
 from tests.operations.adaptive_programs import posted
-from tests.oracles.contours import CIRCLE, SQUARE, closed
+from tests.oracles.contours import CIRCLE, SQUARE, closed, comb
 from tests.oracles.engaged import chords_of, greatest_engagement
 from tests.oracles.swept import complaints
 from tests.paths import mirrored, moved, scaled
@@ -279,8 +289,59 @@ def test_the_limit_is_proved_on_the_predicted_slides(tmp_path: Path) -> None:
     assert "ENGAGEMENT_TOO_HIGH" in names[1]
 
 
-def test_planning_tells_which_share_is_cleared_and_linked() -> None:
-    """Both parts of the stage grow, and end at all; then the stage is that of before."""
+@pytest.mark.parametrize(
+    ("path", "tool_mm", "is_pursued"), [(SQUARE, 0.65, True), (comb(2), 0.5, False)]
+)
+def test_a_pursuit_that_leaves_much_is_given_up(
+    path: Polyline, tool_mm: float, is_pursued: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a comb whose gaps are as wide as the tightest turn nothing is reached: fronts clear all
+    of it, as they do where nothing is pursued."""
+    region, limit = offset_shape(region_of([path]), tool_mm), math.acos(1.0 - 2.0 * 0.2)
+    plan = adaptive_legs(region, 0.5 * tool_mm, tool_mm, limit)
+    monkeypatch.setattr("camtool.planning.adaptive.PURSUED_ROOM_SHARE", math.inf)
+    fronts = adaptive_legs(region, 0.5 * tool_mm, tool_mm, limit)
+    legs, legs_of_fronts = (
+        [leg.vertices.tolist() for stay in each.stays for leg in stay] for each in (plan, fronts)
+    )
+    assert (legs != legs_of_fronts) == is_pursued
+
+
+def pursued(path: Polyline, tool_mm: float, limit: float) -> Pursued:
+    """A pursuit behind its way down, about the middle of a region that reaches from 0 to 10."""
+    region = offset_shape(region_of([path]), tool_mm)
+    ring = np.array([[5.5, 5.0, 1.0], [4.5, 5.0, 1.0], [5.5, 5.0, 0.0]])
+    first = spiral(np.array([5.0, 5.0]), 0.5, 2.0, tool_mm, limit)
+    return Pursued(region, ring, first, tool_mm, limit)
+
+
+def test_a_stroke_counts_only_if_the_way_to_it_stays_in_the_region() -> None:
+    """A link once cut 0.6 µm into a wall."""
+    pursuit = pursued(SQUARE, 1.0, math.radians(60.0))
+    stroke = np.array([[5.0, 5.0, 0.0], [5.5, 5.0, 0.0]])
+    for border_mm, keeps in ((0.999, False), (1.0, True)):
+        x, y, _ = pursuit.pose
+        pursuit.cleared.add(moves_along(np.array([[x, y, 0.0], [1.0, 5.0, 0.0]]), 1.0)[0])
+        link = np.array([[1.0, 5.0, 0.0], [border_mm, 5.0, 0.0], [5.0, 5.0, 0.0]][keeps:])
+        assert pursuit.keeps(Approach(link, False), stroke) == keeps
+
+
+def test_a_square_corner_takes_few_arcs() -> None:
+    """From half of the tool's radius to 2 % of it. Where each has 0.93 of the radius of the one
+    before it takes 47."""
+    pursuit = pursued(SQUARE, 1.0, math.radians(70.0))
+    pursuit.run()
+    legs = [leg.vertices for stay in pursuit.stays for leg in stay if leg.cuts]
+    corner = np.array([1.0, 1.0])
+    about = [each for each in legs if np.hypot(*(each[:, :2] - corner).T).max() < 1.5]
+    assert 2 <= len(about) <= 12
+    assert len(pursuit.stock_left()) == 0
+
+
+@pytest.mark.parametrize(("has_air", "parts"), [(False, ["strokes"]), (True, ["fronts", "links"])])
+def test_planning_tells_which_share_is_cleared_and_linked(has_air: bool, parts: list[str]) -> None:
+    """Each part of the stage grows, and ends at all; then the stage is that of before. Pockets
+    that begin in air are cleared by fronts."""
     told: list[tuple[str, float]] = []
 
     class Told(Progress):
@@ -291,12 +352,16 @@ def test_planning_tells_which_share_is_cleared_and_linked() -> None:
 
     progress = Told()
     progress.begin("planning")
-    adaptive(QUICK["square"], 1.3, math.acos(1.0 - 2.0 * 0.2))
-    assert list(dict.fromkeys(stage for stage, _ in told)) == [
-        "planning – fronts",
-        "planning – links",
-    ]
-    for part in ("fronts", "links"):
+    limit = math.acos(1.0 - 2.0 * 0.2)
+    if has_air:
+        region = offset_shape(region_of([SQUARE]), 0.65)
+        air = Polylines.of([moved(SQUARE, 9.0, 0.0)])
+        adaptive_legs(region, 0.3, 0.65, limit, air)
+    else:
+        adaptive(QUICK["square"], 1.3, limit)
+    stages = [f"planning – {part}" for part in parts]
+    assert list(dict.fromkeys(stage for stage, _ in told)) == stages
+    for part in parts:
         shares = [share for stage, share in told if stage.endswith(part)]
         assert shares == sorted(shares)
         assert len(set(shares)) > 5

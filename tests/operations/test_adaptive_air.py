@@ -160,8 +160,10 @@ PLATE = [box(0, 0, 30, 20), box(14, 8, 18, 12)]
     ids=["passes", "adaptive"],
 )
 def test_behind_a_wider_tool_only_the_rest_is_cut(
-    paths: list[Polyline], wide: dict[str, object]
+    paths: list[Polyline], wide: dict[str, object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Far less is cut than by fronts, which clear rests, in the whole pocket."""
+    monkeypatch.setattr("camtool.planning.adaptive.PURSUED_ROOM_SHARE", math.inf)
     first, rest = steps_of(paths, passes(**wide), adaptive(rest="wide", depth_mm=None), stock=None)
     (alone,) = steps_of(paths, adaptive())
     air = swept(at_depth(list(first.runs), -2.0), 4.0)

@@ -18,10 +18,10 @@ from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotate
 from camtool.operations.profile import checked
 from camtool.operations.profile.work import profile
-from camtool.planning.adaptive import chords
 from camtool.planning.items import CutRun, Fixed
 from camtool.planning.job import Entry, Job, Operation, Tabs, Tool
 from camtool.planning.strategies import width
+from camtool.planning.strokes import chords
 from camtool.planning.trochoids import middles, trochoid_legs, trochoid_step
 from camtool.records import replace
 from tests.oracles.contours import closed

@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 
 from camtool.arrays import Floats
-from camtool.planning.adaptive import chords
 from camtool.planning.items import CutRun
+from camtool.planning.strokes import chords
 
 DIRECTIONS = 360
 EVERY = 23
