@@ -2,7 +2,8 @@
 
     tool centre region, spiral ─pursuit, with tighter turns for narrower places─▶ strokes
       ─arcs between the walls of inner corners, from large to small─▶ more strokes
-      ─each held against the limit by the kernel that proves it─▶ strokes that keep it
+      ─along walls, where a skin is left─▶ more strokes
+      ─each held with its way against the limit, by the kernel of the proof─▶ strokes that keep it
       ─joined within what is cleared by arcs and lines, all tangent─▶ stays
       ─what is stock all the same─▶ points, about which fronts go on (`camtool.planning.adaptive`)
 
@@ -105,6 +106,9 @@ LEAD_SHARES = (1.0, 0.5, 0.25)
 
 SKIM_SHARE = 0.4
 """A stroke along a wall begins and ends so far from the skin that it cuts, over the radius."""
+
+SKIMMED_SHARE = 0.85
+"""Walls are looked at for skins where at least this part is cleared: fewer is given up."""
 
 END_SHARE = 0.0206
 """The last arc in a corner over the tool's radius."""
@@ -344,15 +348,13 @@ class Pursued:
         return corner.disc(min(before.radius + wider_mm, corner.first.radius)) or before
 
     def skim_walls(self) -> None:
-        """Cut along walls what is left as a skin beside them."""
+        """Cut along walls what is left as a skin beside them, if not much is left elsewhere."""
         walls = list(MeasuredPaths(self.region))
-        away = [Segments.of(wall.path) for wall in walls]
         points = self.stock_left()
-        if len(points) == 0:
+        if len(points) == 0 or self.pursuit.cleared_mm2 < SKIMMED_SHARE * self.reach_mm2:
             return
-        of_wall = np.argmin(
-            [points_to_segments(points, each).min(axis=1) for each in away], axis=0
-        )
+        away = [points_to_segments(points, wall.segments).min(axis=1) for wall in walls]
+        of_wall = np.argmin(away, axis=0)
         for number, wall in enumerate(walls):
             own = points[of_wall == number]
             lengths = np.sort([wall.nearest_to((x, y)) for x, y in own.tolist()])
@@ -410,22 +412,17 @@ class Pursued:
 def stretches(lengths: Floats, wall: MeasuredPath, far_mm: float) -> Iterator[tuple[float, float]]:
     """Yield the stretches of a wall about lengths along it in their order, mm, which begin and end
     so far from the nearest of them, or at a corner of the wall."""
-    corners = wall.reach[:-1][np.abs(wall.turns) > MIN_CORNER_RAD]
     total = wall.total_mm
-    corners = np.concatenate([corners - total, corners, corners + total])
-    cut = [0.0, total] if not len(corners) else corners
-    gaps = np.flatnonzero(np.diff(lengths) > 2.0 * far_mm) + 1
-    for group in np.split(lengths, gaps):
-        if len(group) == 0:
-            continue
-        side = np.searchsorted(cut, group)
-        for part in np.unique(side) if len(corners) else [0]:
-            own = group[side == part] if len(corners) else group
-            low, high = own[0] - far_mm, own[-1] + far_mm
-            if len(corners):
-                low, high = max(low, corners[part - 1]), min(high, corners[part])
-            if 0.0 < high - low < total:
-                yield low, high
+    corners = wall.reach[:-1][np.abs(wall.turns) > MIN_CORNER_RAD]
+    corners = np.concatenate([[-math.inf], corners - total, corners, corners + total, [math.inf]])
+    after = np.searchsorted(corners, lengths, side="right")
+    apart = (np.diff(lengths) > 2.0 * far_mm) | (np.diff(after) > 0)
+    for own in np.split(np.arange(len(lengths)), np.flatnonzero(apart) + 1):
+        if len(own):
+            low = max(lengths[own[0]] - far_mm, corners[after[own[0]] - 1])
+            high = min(lengths[own[-1]] + far_mm, corners[after[own[0]]])
+            if high - low < total:
+                yield float(low), float(high)
 
 
 def discs_about(points: Floats, wide_mm: float) -> Floats:

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Floats
 from camtool.kernels.pursuit import Pursuit
-from camtool.planning.pursuing import corners_of, discs_about, pieces_of
+from camtool.planning.paths import MeasuredPath
+from camtool.planning.pursuing import corners_of, discs_about, pieces_of, stretches
 from camtool.planning.strokes import chords
-from tests.oracles.contours import SQUARE
+from tests.oracles.contours import CIRCLE, SQUARE
 from tests.planning.pocket_cases import region_of
 from tests.strategies import examples
 
@@ -173,3 +174,25 @@ def test_discs_hold_their_points(points: list[tuple[float, float]], wide: float)
     gap = np.hypot(*(where[:, None, :] - discs[None, :, :2]).transpose(2, 0, 1)) - discs[:, 2]
     assert (gap.min(axis=1) <= 1e-9).all()
     assert (discs[:, 2] <= wide).all()
+
+
+@examples(60, nightly=1_000)
+@given(st.lists(st.floats(0.0, 39.9), min_size=1, max_size=12), st.floats(0.05, 3.0))
+def test_stretches_of_a_wall_hold_all_lengths_between_its_corners(
+    lengths: list[float], far_mm: float
+) -> None:
+    """Along a square of 10 mm: each begins and ends so far from the nearest, or at a corner."""
+    wall = MeasuredPath.of(SQUARE)
+    found = list(stretches(np.sort(lengths), wall, far_mm))
+    for at in lengths:
+        assert any(low <= at <= high for low, high in found)
+    for low, high in found:
+        assert math.floor(low / 10.0 + 1e-12) == math.ceil(high / 10.0 - 1e-12) - 1
+        for end in (low, high):
+            near = min(abs(end - at) for at in lengths)
+            assert near == pytest.approx(far_mm) or (near < far_mm and abs(end % 10.0) < 1e-9)
+
+
+def test_a_wall_without_corners_is_one_stretch() -> None:
+    wall = MeasuredPath.of(CIRCLE)
+    assert list(stretches(np.array([1.0, 1.5]), wall, 0.5)) == [(0.5, 2.0)]
