@@ -416,8 +416,8 @@ def stretches(lengths: Floats, wall: MeasuredPath, far_mm: float) -> Iterator[tu
     corners = wall.reach[:-1][np.abs(wall.turns) > MIN_CORNER_RAD]
     corners = np.concatenate([[-math.inf], corners - total, corners, corners + total, [math.inf]])
     after = np.searchsorted(corners, lengths, side="right")
-    apart = (np.diff(lengths) > 2.0 * far_mm) | (np.diff(after) > 0)
-    for own in np.split(np.arange(len(lengths)), np.flatnonzero(apart) + 1):
+    is_gap = (np.diff(lengths) > 2.0 * far_mm) | (np.diff(after) > 0)
+    for own in np.split(np.arange(len(lengths)), np.flatnonzero(is_gap) + 1):
         if len(own):
             low = max(lengths[own[0]] - far_mm, corners[after[own[0]] - 1])
             high = min(lengths[own[-1]] + far_mm, corners[after[own[0]]])

@@ -307,6 +307,22 @@ def test_a_pursuit_that_leaves_much_is_given_up(
     assert (legs != legs_of_fronts) == is_pursued
 
 
+def test_chambers_behind_a_neck_are_cleared_one_by_one() -> None:
+    """A neck 3 % wider than the tool: by discs that fit through it the second chamber would take
+    19 m of cuts, and the first one takes 0.7 m."""
+    low, high = (20.0, 8.0), (20.0, 12.12)
+    chambers = closed(
+        *((0, 0), (20, 0), low, (26, 8), (26, 0), (46, 0)),
+        *((46, 20), (26, 20), (26, 12.12), high, (20, 20), (0, 20)),
+    )
+    limit = math.radians(60.0)
+    runs = adaptive([chambers], 4.0, limit)
+    assert complaints(runs, region_of([chambers]), 2.0, -1.0, share=SHARE) == []
+    assert greatest_engagement(runs, 2.0, 4e-3 * 2.0) <= 1.02 * limit
+    assert sum(length_of(run) for run in runs) < 6_000.0
+    assert len([run for run in runs if run.vertices[0, 2] == 0.0]) == 2
+
+
 def pursued(path: Polyline, tool_mm: float, limit: float) -> Pursued:
     """A pursuit behind its way down, about the middle of a region that reaches from 0 to 10."""
     region = offset_shape(region_of([path]), tool_mm)

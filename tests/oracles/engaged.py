@@ -20,17 +20,20 @@ EVERY = 23
 def greatest_engagement(
     runs: Sequence[CutRun], radius: float, thick: float, air: shapely.Geometry | None = None
 ) -> float:
-    """Return the greatest engagement angle, rad, behind the entry: the front of the tool's circle
+    """Return the greatest engagement angle, rad, behind each entry: the front of the tool's circle
     is looked at in many directions, and a point of it is air where it is nearer than the radius to
     any place where the tool was before. With `air`, which is none of the stock, there is no entry:
     all of the way counts."""
-    ends = np.concatenate([chords_of(run) for run in runs])
+    each = [chords_of(run) for run in runs]
+    ends = np.concatenate(each)
     level = ends[:, 4:].max(axis=1) < ends[:, 4:].min() + 1e-6
     moves = ends[level][:, :4]
     length = np.hypot(*(moves[:, 2:] - moves[:, :2]).T)
     way = np.cumsum(length)
-    begin = 2.0 * math.pi * radius if air is None else 0.0
-    is_judged = (way > begin) & (length > 1e-9)
+    of_run = np.repeat(np.arange(len(runs)), [len(own) for own in each])[level]
+    has_helix = np.array([run.vertices[0, 2] >= 0.0 for run in runs])
+    begins = way[np.searchsorted(of_run, of_run)] + 2.0 * math.pi * radius
+    is_judged = (length > 1e-9) & ((way > begins) | ~has_helix[of_run] | (air is not None))
     wide_air = None if air is None else air.buffer(thick)
     angles = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS * math.pi - 0.5 * math.pi
     greatest = 0.0
