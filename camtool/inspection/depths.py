@@ -133,7 +133,13 @@ class Floors:
         band_mm = MARGIN_MM + beside_mm
         self._solid = WantedSolid(self._exact.may, (), band_mm)
         tabs = [
-            (*bridge.centre, 0.5 * tabs.width_mm + 2.0 * step.operation.tool.radius_mm + band_mm)
+            (
+                *bridge.centre,
+                0.5 * tabs.width_mm
+                + step.operation.tool.radius_mm
+                + bridge.half_span_mm
+                + band_mm,
+            )
             for step in steps
             if (tabs := step.operation.tabs) is not None
             for bridge in step.bridges

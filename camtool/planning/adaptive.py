@@ -46,7 +46,14 @@ from camtool.geometry.measure import (
 )
 from camtool.geometry.nesting import inside
 from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Polyline,
+    Polylines,
+    Segments,
+    reverse,
+    reverse_lines,
+)
 from camtool.kernels.engagement import Cleared
 from camtool.kernels.offsets import insides, meetings_of, pairs_of
 from camtool.planning.clearing import outside_parts, parts_of, pole
@@ -219,8 +226,8 @@ def fronts(
     discs that begin with the first of two radii, grow up to the second as what is cleared gets
     wider, and shrink then. `holes` are clear too, and nothing begins there."""
     opening, widest = openings_mm
-    reached = _union([clear])
-    before = _union([reached, holes]) if len(holes) else reached
+    reached = union_of([clear])
+    before = union_of([reached, holes]) if len(holes) else reached
     number, grows = 0, True
     first_mm2, last_mm2 = (float(signed_areas(each).sum()) for each in (before, region))
     while opening > CORNER_SHARE * tool_mm and number < MAX_FRONTS:
@@ -233,7 +240,7 @@ def fronts(
             grown = offset_shape(inner, -(opening + step))
             inner = _common(grown, region, opening)
             wider = offset_shape(inner, -opening)
-            after = _union([wider, clear])
+            after = union_of([wider, clear])
             if signed_areas(after).sum() - signed_areas(reached).sum() < growth:
                 grows = False
                 break
@@ -243,7 +250,7 @@ def fronts(
                     fit_mm = FIT_SHARE * min(tool_mm, FIT_OPENINGS * opening)
                     yield FrontStroke(_smooth(piece, is_smooth, fit_mm), number, opening)
             reached = after
-            before = _union([reached, holes]) if len(holes) else reached
+            before = union_of([reached, holes]) if len(holes) else reached
             cleared_mm2 = float(signed_areas(before).sum()) - first_mm2
             tell_share("fronts", cleared_mm2 / max(last_mm2 - first_mm2, cleared_mm2))
             if grows and len(offset_shape(reached, next_mm + UNION_MM)):
@@ -563,8 +570,8 @@ def adaptive_legs(
             return AdaptiveStays(centre, helix, stays)
     full_region, widest = region, max(opening, room)
     if len(air):
-        full_region = _union([region, clear, holes])
-        clear, holes = _union([clear]), _union([holes])
+        full_region = union_of([region, clear, holes])
+        clear, holes = union_of([clear]), union_of([holes])
     strokes = fronts(full_region, clear, (opening, widest), tool_mm, limit, holes)
     clearing.take(list(strokes))
     stays = list(clearing.legs(first)) if helix or clearing.cuts(first) else []
@@ -607,7 +614,7 @@ def _places_left(
     discs, fine_mm = discs_about(points, 0.5 * tool_mm), END_SHARE * tool_mm
     reached = offset_shape(offset_shape(region, fine_mm), -fine_mm)
     near, stock = (
-        _union([Polylines.of([_circle(row[:2], row[2] + wide * tool_mm)]) for row in discs])
+        union_of([Polylines.of([_circle(row[:2], row[2] + wide * tool_mm)]) for row in discs])
         for wide in (NEAR_SHARE, STOCK_SHARE)
     )
     frame = offset_shape(near, -tool_mm)
@@ -661,10 +668,10 @@ def _places_in_air(air: Polylines, tool_mm: float) -> Polylines:
     if len(air) == 0:
         return air
     slack_mm = AIR_SLACK_SHARE * tool_mm
-    return offset_shape(_union([air], slack_mm), tool_mm)
+    return offset_shape(union_of([air], slack_mm), tool_mm)
 
 
-def _union(regions: list[Polylines], wider_mm: float = UNION_MM) -> Polylines:
+def union_of(regions: list[Polylines], wider_mm: float = UNION_MM) -> Polylines:
     """Return what is in any of some regions, grown by a distance."""
     loops = offset_shape(Polylines.joined(regions), -wider_mm)
     starts = loops.vertices[loops.offsets[:-1], :2]
@@ -695,19 +702,42 @@ def _ring(centre: Floats, radius_mm: float) -> list[list[float]]:
     return [[x + radius_mm, y, 1.0], [x - radius_mm, y, 1.0], [x + radius_mm, y, 0.0]]
 
 
-def wide_parts(region: Polylines, tool_mm: float) -> list[Polylines]:
-    """Return the connected parts of a tool centre region that discs reach which have room for a
-    helix: necks that are narrower part it, and stay."""
-    opening = 1.01 * (MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm)
-    shrunk_mm = neck_mm(tool_mm)
-    return parts_of(offset_shape(offset_shape(region, shrunk_mm), -opening))
+def wide_parts(
+    region: Polylines, tool_mm: float, zones: Polylines = NO_AIR, corner_mm: float = 0.0
+) -> list[Polylines]:
+    """Return the connected parts of a tool centre region, without some zones (CCW), that discs
+    reach which have room for a helix, or of the radius `corner_mm` if that is larger: necks that
+    are narrower part it, and stay."""
+    smallest_mm = _least_opening(tool_mm)
+    wider_mm = max(corner_mm - smallest_mm, 0.0)
+    free = region
+    if len(zones):
+        zones = union_of([zones])
+        free = Polylines.joined([region, reverse_lines(zones)])
+    shrunk = offset_shape(free, neck_mm(tool_mm) + wider_mm)
+    if len(zones):
+        starts = shrunk.vertices[shrunk.offsets[:-1], :2]
+        is_free = inside(starts, Segments.of(region)) & ~inside(starts, Segments.of(zones))
+        shrunk = shrunk.select(np.flatnonzero(is_free))
+    return parts_of(offset_shape(shrunk, -(smallest_mm + wider_mm)))
+
+
+def wide_parts_within(region: Polylines, tool_mm: float, zone: Polylines) -> list[Polylines]:
+    """Return the connected parts of a tool centre region within a zone (CCW) that discs reach
+    which have room for a helix."""
+    shrunk = _common(region, zone, neck_mm(tool_mm))
+    return parts_of(offset_shape(shrunk, -_least_opening(tool_mm)))
+
+
+def _least_opening(tool_mm: float) -> float:
+    """Return the radius of the smallest discs that have room for a helix, mm."""
+    return 1.01 * (MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm)
 
 
 def neck_mm(tool_mm: float) -> float:
     """Return how far from the boundary of a tool centre region there must be places for a neck of
     it to be cleared."""
-    opening = 1.01 * (MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm)
-    return opening + (FIT_SHARE + WALL_SHARE) * tool_mm
+    return _least_opening(tool_mm) + (FIT_SHARE + WALL_SHARE) * tool_mm
 
 
 def adaptive_runs(
@@ -773,13 +803,16 @@ def entry_mm(operation: Operation) -> float:
     return min(operation.entry.radius_mm or HELIX_SHARE * tool_mm, tool_mm)
 
 
-def runs_of(clearings: Sequence[AdaptiveStays], setting: Setting, name: str) -> list[CutRun]:
-    """Return the runs that make all stays at all levels, in order; where the operation is cut
-    conventionally they are mirrored about X = 0, as the regions were for which they were made."""
+def runs_of(
+    clearings: Sequence[AdaptiveStays], setting: Setting, name: str, heights_mm: Sequence[float]
+) -> list[CutRun]:
+    """Return the runs that make all stays at all levels, in order: at each of these heights but
+    the first, to which it is cleared already. Where the operation is cut conventionally they are
+    mirrored about X = 0, as the regions were for which they were made."""
     legs = [_with_feeds(each, setting) for each in clearings]
     return [
         run
-        for heights in pairwise((0.0, *setting.levels_mm))
+        for heights in pairwise(heights_mm)
         for each, own_legs in zip(clearings, legs, strict=True)
         for run in _runs_at(each, own_legs, heights, setting, name)
     ]

@@ -442,6 +442,10 @@ SLOT_AS_WIDE_ADAPTIVE = PlanningCode.SLOT_AS_WIDE.says(
 TAB_LEFT_OUT = PlanningCode.TAB_LEFT_OUT.says(
     "there is no room for a tab of this width: the contour has one less"
 )
+TAB_LEFT_OUT_OF_SLOT = PlanningCode.TAB_LEFT_OUT.says(
+    "there is no room for a tab of this width with stock beyond the slot to hold on to: the "
+    "contour has one less"
+)
 TAB_LEFT_OUT_DRILLED = PlanningCode.TAB_LEFT_OUT.says(
     "a hole is drilled through this tab of {contour}: it may not hold"
 )

@@ -193,13 +193,6 @@ def contours_along(
     ]
 
 
-class Work(Struct, frozen=True, eq=False):
-    """The items that an operation made of its paths, and findings."""
-
-    items: Items
-    findings: tuple[Finding, ...] = ()
-
-
 class Air(Struct, frozen=True, eq=False):
     """A `region` (on the left of its closed paths, work frame) in which no stock is left above
     `z_mm`."""
@@ -243,6 +236,15 @@ class Bridge(Struct, frozen=True, eq=False):
     top_mm: float
     fall: float
     name: str
+
+
+class Work(Struct, frozen=True, eq=False):
+    """The items that an operation made of its paths, findings, and the bridges that fixed items
+    leave (those of contours follow from where they begin)."""
+
+    items: Items
+    findings: tuple[Finding, ...] = ()
+    bridges: tuple[Bridge, ...] = ()
 
 
 class Step(Struct, frozen=True, eq=False):

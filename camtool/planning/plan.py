@@ -36,7 +36,6 @@ from camtool.planning.findings import (
 from camtool.planning.finish import in_passes, of_stage
 from camtool.planning.gouges import branch_findings, side_findings
 from camtool.planning.items import (
-    Bridge,
     Chosen,
     Contour,
     Fixed,
@@ -267,7 +266,7 @@ def _step(
     _refuse_endless(items, setting)
     rows = best_order(choices, must_precede(items), *ends)
     order = choices.owner[rows]
-    bridges: tuple[Bridge, ...] = ()
+    bridges = work.bridges
     if contours := contours_of(items):
         paths = chosen_paths(contours, choices, rows)
         cut = runs_of(contours, order, paths, _walls(placed_drawing, sides, setting.operation))
@@ -322,13 +321,15 @@ def _is_divided(job: Job, operation: Operation) -> bool:
 
 def _sparing(steps: list[Step]) -> list[Step]:
     """Return the steps with their runs raised over the bridges of all tabs, whichever step leaves
-    them."""
+    them. Fixed items keep away from their own."""
     bridges = [bridge for step in steps for bridge in step.bridges]
     if not bridges:
         return steps
     spared = []
     for step in steps:
-        raised = raised_over_bridges(step.runs, step.operation, step.setting.feeds, bridges)
+        own = {id(bridge) for bridge in step.bridges if not contours_of(step.items)}
+        others = [bridge for bridge in bridges if id(bridge) not in own]
+        raised = raised_over_bridges(step.runs, step.operation, step.setting.feeds, others)
         findings = (*step.findings, *of_stage(step.operation, raised.findings))
         spared.append(replace(step, runs=raised.runs, findings=findings))
     return spared

@@ -11,6 +11,10 @@ bridge (as in a slot hardly wider than the tool, where there is nothing to hold 
 of a tab are straight up and down, or slope; the bridge is w wide at its top. Slopes keep to the
 angle of the entry when that is a ramp, so that the tool never goes down more steeply.
 
+In a slot that is wider than the tool (`Span`) the bridge reaches from the wall to the other side,
+where stock must be left to hold on to: no wall is nearer there than that of the tab. Between two
+tabs there is room for the circles that clear such a slot.
+
 Tabs stand at the centre of equal shares of the path, or where they are wanted by hand. None lies
 across a corner, its slopes included: not at a vertex where the path turns, and not on the arc on
 which the tool goes round a corner of the drawing. One that would moves to the nearest place where
@@ -39,6 +43,7 @@ from camtool.planning.findings import (
     TAB_LEFT_OUT,
     TAB_LEFT_OUT_DRILLED,
     TAB_LEFT_OUT_OF_ALL,
+    TAB_LEFT_OUT_OF_SLOT,
     TAB_SHARED,
     TAB_SHARED_WITH_OWN,
 )
@@ -118,6 +123,21 @@ class Tab(Struct, frozen=True):
         """Return the lowest z that the tab allows at this length, mm; −inf beside it."""
         distance = max(self.begin - length, length - self.end, 0.0)
         return self.top_mm - (self.fall * distance if distance else 0.0)
+
+
+class Span(Struct, frozen=True, eq=False):
+    """What tabs span in slots wider than the tool: its centre gets up to `left_mm` to the left of
+    the contour and `right_mm` to the right. `walls`: the paths of the centre along all other walls
+    and lines that the slots follow, None without any. `corner_mm`: bridges count as wider by twice
+    this, so that a later pass keeps out of the corners beside them."""
+
+    left_mm: float = 0.0
+    right_mm: float = 0.0
+    walls: Segments | None = None
+    corner_mm: float = 0.0
+
+
+AS_WIDE_AS_TOOL = Span()
 
 
 def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
@@ -217,9 +237,11 @@ def _is_long_enough(contour: Contour) -> bool:
     return count * (model.end + 2.0 * foot) <= total * (1.0 + COUNT_SLACK)
 
 
-def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Finding]]:
-    """Return the tabs of a contour, whose path from its start is `along`, and findings for those
-    that do not fit.
+def tabs_of(
+    contour: Contour, along: MeasuredPath, span: Span = AS_WIDE_AS_TOOL
+) -> tuple[list[Tab], list[Finding]]:
+    """Return the tabs of a contour, whose path from its start is `along`, in a slot that has this
+    `span`, and findings for those that do not fit.
 
     OptionError for tabs that are higher than the cut is deep or together longer than the path."""
     operation = contour.setting.operation
@@ -244,21 +266,25 @@ def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Find
         centres = [(number + 0.5) * size for number in range(count)]
         ranges = [(number * size, (number + 1) * size) for number in range(count)]
     half_width = 0.5 * tabs.width_mm
-    fitting = _Fitting(along, model, foot, half_width, _corners(along, operation))
+    fitting = _Fitting(
+        along, model, foot, half_width, _corners(along, operation), span, operation.tool.radius_mm
+    )
     tabs_placed: list[Tab] = []
     findings = []
-    for centre, span in zip(centres, ranges, strict=True):
-        tab = fitting.nearest(centre, span, tabs_placed)
+    for centre, share in zip(centres, ranges, strict=True):
+        tab = fitting.nearest(centre, share, tabs_placed)
         if tab is None:
-            findings.append(_left_out_finding(contour, along, centre))
+            place = at_place(contour.name, along.at(np.array([centre]))[0].tolist())
+            is_slot = operation.makes_slots
+            findings.append((TAB_LEFT_OUT_OF_SLOT if is_slot else TAB_LEFT_OUT)(where=place))
         else:
             tabs_placed.append(tab)
     return sorted(tabs_placed, key=lambda tab: tab.begin), findings
 
 
 def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
-    """Return a tab of the operation that begins at the length 0, and the length of the slope on
-    each side of it."""
+    """Return a tab of the operation that begins at the length 0, and the length on each side of it
+    that its slope needs, or half a circle of a slot wider than the tool."""
     tabs = operation.tabs
     assert tabs is not None
     end, top = tabs.width_mm + operation.tool.diameter_mm, bottom_mm + tabs.height_mm
@@ -268,7 +294,7 @@ def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
         slopes = operation.entry.kind != "plunge"
         angle = min(SIDE_ANGLE_RAD, operation.entry.angle_rad) if slopes else SIDE_ANGLE_RAD
         model = Tab(0.0, end, top, math.tan(angle))
-    return model, model.foot(bottom_mm)
+    return model, max(model.foot(bottom_mm), 0.5 * operation.spare_mm)
 
 
 def raise_profile(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfile:
@@ -335,8 +361,9 @@ def _checked_tab_count(total_mm: float, operation: Operation, length_mm: float) 
     together longer than the path."""
     count = _tab_count(total_mm, operation)
     if count * length_mm > total_mm * (1.0 + COUNT_SLACK):
+        added = "width of the slot" if operation.makes_slots else "tool's diameter"
         raise OptionError(
-            f"{count} tabs of {length_mm:.4g} mm (with the tool's diameter) are longer than the"
+            f"{count} tabs of {length_mm:.4g} mm (with the {added}) are longer than the"
             f" contour of {total_mm:.4g} mm",
             where=key_of(operation, "tabs"),
             mend="give fewer or narrower tabs, or leave small contours to another operation",
@@ -373,14 +400,17 @@ class _Corners(Struct, frozen=True, eq=False):
 
 
 class _Fitting(Struct, frozen=True, eq=False):
-    """The conditions under which tabs like the `model`, with slopes of `foot_mm`, fit on a path;
-    `half_width_mm`: half the width of the bridge under them."""
+    """The conditions under which tabs like the `model`, with slopes of `foot_mm`, fit on a path of
+    a tool of `radius_mm`; `half_width_mm`: half the width of the bridge under them, which has this
+    `span`."""
 
     along: MeasuredPath
     model: Tab
     foot_mm: float
     half_width_mm: float
     corners: _Corners
+    span: Span
+    radius_mm: float
 
     def nearest(
         self, centre: float, share: tuple[float, float], other_tabs: Sequence[Tab]
@@ -464,7 +494,28 @@ class _Fitting(Struct, frozen=True, eq=False):
         room = 2.0 * foot - TAB_SLACK_MM
         if any(tab.begin < each.end + room and each.begin < tab.end + room for each in other_tabs):
             return None
-        return tab if _is_bridge_clear(self.along, tab) else None
+        return tab if self._is_bridge_clear(tab) else None
+
+    def _is_bridge_clear(self, tab: Tab) -> bool:
+        """Return True if no other part of the path, and no other wall of a slot, comes nearer to
+        the centre of the bridge than the ends of the tab do, nor to the stock that it ends at
+        across a slot wider than the tool."""
+        along, span = self.along, self.span
+        ends = along.at(np.array([tab.begin, tab.end]))
+        middle, normal = ends.mean(axis=0), _normal_of(ends[1] - ends[0])
+        sides = [side for side in (span.left_mm, -span.right_mm) if side]
+        away = [side + math.copysign(self.radius_mm, side) for side in sides]
+        places = np.array([middle, *(middle + distance * normal for distance in away)])
+        reach = np.hypot(*(places - ends[0]).T) - TAB_SLACK_MM
+        other_spans = [(0.0, tab.begin), (tab.end, along.total_mm)]
+        if along.path.closed:
+            other_spans = [(tab.end, tab.begin + along.total_mm)]
+        for begin, end in other_spans:
+            piece = along.piece(begin, end)
+            segments = Segments.between(piece[:-1, :2], piece[1:, :2], piece[:-1, 2])
+            if (points_to_segments(places, segments).min(axis=1) < reach).any():
+                return False
+        return span.walls is None or bool((nearest(places, span.walls).distance >= reach).all())
 
 
 def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
@@ -515,36 +566,30 @@ def _half_length(along: MeasuredPath, centre: float, chord: float, room: float) 
     return high
 
 
-def _is_bridge_clear(along: MeasuredPath, tab: Tab) -> bool:
-    """Return True if no other part of the path comes nearer to the centre of the bridge than the
-    ends of the tab do."""
-    ends = along.at(np.array([tab.begin, tab.end]))
-    other_spans = [(0.0, tab.begin), (tab.end, along.total_mm)]
-    if along.path.closed:
-        other_spans = [(tab.end, tab.begin + along.total_mm)]
-    half_gap = 0.5 * math.hypot(*(ends[1] - ends[0])) - TAB_SLACK_MM
-    for begin, end in other_spans:
-        piece = along.piece(begin, end)
-        segments = Segments.between(piece[:-1, :2], piece[1:, :2], piece[:-1, 2])
-        if points_to_segments(ends.mean(axis=0)[None], segments).min() < half_gap:
-            return False
-    return True
+def _normal_of(ahead: Floats) -> Floats:
+    """Return the unit vector (2,) on the left of a direction (2,)."""
+    return np.array([-ahead[1], ahead[0]]) / math.hypot(*ahead)
 
 
-def _left_out_finding(contour: Contour, along: MeasuredPath, length: float) -> Finding:
-    return TAB_LEFT_OUT(where=at_place(contour.name, along.at(np.array([length]))[0].tolist()))
-
-
-def bridges_of(along: MeasuredPath, tabs: Sequence[Tab], tool: Tool, name: str) -> list[Bridge]:
-    """Return the bridges that the tabs of a contour leave; none for a tool without width."""
+def bridges_of(
+    along: MeasuredPath,
+    tabs: Sequence[Tab],
+    tool: Tool,
+    name: str,
+    span: Span = AS_WIDE_AS_TOOL,
+) -> list[Bridge]:
+    """Return the bridges that the tabs of a contour leave across a slot that has this span; none
+    for a tool without width."""
     bridges = []
     for tab in tabs if tool.radius_mm > 0.0 else ():
         a, b, centre = along.at(np.array([tab.begin, tab.end, 0.5 * (tab.begin + tab.end)]))
         size = math.hypot(*(b - a))
         direction = (b - a) / size
         centre = centre + float((0.5 * (a + b) - centre) @ direction) * direction
-        half = 0.5 * size - tool.radius_mm
-        bridges.append(Bridge(centre, direction, half, tool.radius_mm, tab.top_mm, tab.fall, name))
+        centre = centre + 0.5 * (span.left_mm - span.right_mm) * _normal_of(direction)
+        half = 0.5 * size - tool.radius_mm + span.corner_mm
+        half_span = tool.radius_mm + 0.5 * (span.left_mm + span.right_mm)
+        bridges.append(Bridge(centre, direction, half, half_span, tab.top_mm, tab.fall, name))
     return bridges
 
 
@@ -650,7 +695,7 @@ def _note_drilled(run: CutRun, bridge: Bridge, tool: Tool, raised: _RaisedBridge
     place, depth = run.vertices[:1, :2], float(run.vertices[:, 2].min())
     reach = tool.radius_mm - BRIDGE_SLACK_MM
     is_through = depth < bridge.top_mm and reach > 0.0
-    if is_through and inside(place, Segments.of(_zone(bridge, reach)))[0]:
+    if is_through and inside(place, Segments.of(bridge_zone(bridge, reach)))[0]:
         raised.drilled[id(bridge)] = (bridge, run.name)
 
 
@@ -663,7 +708,7 @@ def _tabs_over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> 
     reach = tool.radius_at(bridge.top_mm - float(low.min())) - BRIDGE_SLACK_MM
     if reach <= 0.0:
         return
-    zone = Segments.of(_zone(bridge, reach))
+    zone = Segments.of(bridge_zone(bridge, reach))
     boxes, zone_boxes = segment_boxes(along.segments), segment_boxes(zone)
     lowest, highest = zone_boxes[:, :2].min(axis=0), zone_boxes[:, 2:].max(axis=0)
     rows = np.flatnonzero(((boxes[:, :2] <= highest) & (boxes[:, 2:] >= lowest)).all(axis=1))
@@ -690,9 +735,9 @@ def _tabs_over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> 
             yield Tab(first, last, bridge.top_mm, bridge.fall)
 
 
-def _zone(bridge: Bridge, reach_mm: float) -> Polyline:
-    """Return the boundary of the zone within `reach_mm` of a bridge, in which the centre of a tool
-    of this radius would cut into it."""
+def bridge_zone(bridge: Bridge, reach_mm: float) -> Polyline:
+    """Return the boundary (CCW) of the zone within `reach_mm` of a bridge, in which the centre of
+    a tool of this radius would cut into it."""
     normal = np.array([-bridge.ahead[1], bridge.ahead[0]])
     w, s, r = bridge.half_width_mm, bridge.half_span_mm, reach_mm
     corners = [

@@ -209,7 +209,7 @@ def test_a_slot_that_comes_over_another_part_is_an_error(tmp_path: Path) -> None
         ({"own": (*OWN, ("slot_width", width("5mm")))}, "slot_width"),
         ({"own": (("strategy", "adaptive"),)}, "strategy"),
         ({"tool": Tool(0.0)}, "tool"),
-        ({"tabs": Tabs(count=2)}, "tabs"),
+        ({"tabs": Tabs(count=2, ramped=True)}, "tabs"),
         ({"corners": "dogbone"}, "corners"),
         ({"joins": "sharp"}, "joins"),
     ],

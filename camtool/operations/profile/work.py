@@ -105,13 +105,12 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
             replace(line, path=without_feet(line.path, tool_mm)) for line in lines.lines
         ]
     elif operation.makes_slots:
-        from camtool.operations.profile.slots import SlotWall, slot_items
+        from camtool.operations.profile.slots import SlotWall, slot_work
 
         walls = [SlotWall(line.path, line.sources[0]) for line in lines.lines]
-        return Work(slot_items(walls, opens, chosen, setting), tuple(lines.findings))
-    names, sources = [chosen.names[k] for k in opens], chosen.source[opens].tolist()
-    on_line = contours_along(chosen.lines.select(opens), setting, names, sources)
-    items = [*_side_contours(lines.lines, chosen, setting), *on_line]
+        contours = _contours(lines.lines, opens, chosen, setting)
+        return slot_work(walls, opens, contours, chosen, setting, lines.findings)
+    items = _contours(lines.lines, opens, chosen, setting)
     return Work(sorted(items, key=lambda each: each.source), tuple(lines.findings))
 
 
@@ -310,6 +309,15 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
             for corner in relieved.left.tolist()
         )
     return replace(line, path=path, plain_path=line.path)
+
+
+def _contours(
+    lines: list[_Line], opens: list[int], chosen: Chosen, setting: Setting
+) -> list[Contour]:
+    """Return the lines, and the chosen paths that are cut as they are drawn, as contours."""
+    names, sources = [chosen.names[k] for k in opens], chosen.source[opens].tolist()
+    on_line = contours_along(chosen.lines.select(opens), setting, names, sources)
+    return [*_side_contours(lines, chosen, setting), *on_line]
 
 
 def _side_contours(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contour]:
