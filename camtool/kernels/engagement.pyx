@@ -12,8 +12,10 @@ advance.)
 
 From that comes a bound for a stretch of the move: wherever the tool is in a stretch of half length
 h, its edge is within h of where it would be in the middle. What is engaged there is also engaged
-in the middle, with all cleared places taken narrower by h. A stretch whose bound is too high is
-halved, until h is a sixteenth of `thick`.
+in the middle, with all cleared places taken narrower by h, on a front wider at both ends by the
+angle through which the tool turns within h, and with all that was cleared on the last of the way to
+the begin of the stretch. So the bound of a stretch is never below that of a part of it. A stretch
+whose bound is too high is halved, until h is a sixteenth of `thick` and the tool hardly turns.
 
 Of all earlier moves only those matter that come within R of a place of the circle which is still
 open. Moves lie in a grid of cells, each in those that it crosses; the open angles are taken in
@@ -49,8 +51,9 @@ cdef double PI = math.pi
 cdef double INFINITY = float("inf")
 # The last of the tool's way is so many times `thick`.
 cdef double RECENT = 100.0
-# A stretch of so many times `thick` is not halved.
+# A stretch of so many times `thick` is not halved, where the tool turns by less than the angle, rad.
 cdef double FINEST = 1.0 / 16.0
+cdef double FINEST_TURN = 1e-3
 # Angles smaller than this are no engagement, rad: rounding of sines at a tangent.
 cdef double NO_ANGLE = 1e-7
 # Cuts as deep as this tool or deeper, up to this, have cleared what it meets, mm.
@@ -318,13 +321,13 @@ cdef double _greatest(
         waiting -= 1
         low, high = lows[waiting], highs[waiting]
         half = 0.5 * (high - low)
-        bound = _open_angle(self, move, length, low, high, thick - half, thick)
+        bound = _bound(self, move, length, low, high, thick)
         if bound <= best:
             continue
-        if bound <= greatest or half <= FINEST * thick or waiting + 2 > WAITING:
+        if bound <= greatest or _is_finest(move, length, half, thick) or waiting + 2 > WAITING:
             best = bound
             continue
-        value = _open_angle(self, move, length, low, high, thick, thick)
+        value = _value(self, move, length, low + half, thick)
         slack = coarse if bound <= enough else fine
         if bound - value <= slack < INFINITY:
             best = bound
@@ -349,11 +352,11 @@ cdef double _first_above(Cleared self, double* move, double thick, double limit)
     while waiting:
         high = ends[waiting - 1]
         half = 0.5 * (high - low)
-        if _open_angle(self, move, length, low, high, thick - half, thick) <= limit:
+        if _bound(self, move, length, low, high, thick) <= limit:
             waiting, low = waiting - 1, high
-        elif half <= FINEST * thick or waiting == WAITING:
+        elif _is_finest(move, length, half, thick) or waiting == WAITING:
             return low / length
-        elif _open_angle(self, move, length, low, high, thick, thick) > limit:
+        elif _value(self, move, length, low + half, thick) > limit:
             # It is exceeded in the middle: what lies behind does not matter.
             waiting, first, ends[0] = 1, low + half, low + half
         else:
@@ -374,22 +377,47 @@ cdef double _all_round(Cleared self, double* move, double thick) noexcept nogil:
             aside[k] = move[k]
         aside[BX], aside[BY] = move[AX] + side, move[AY]
         aside[ASKEW] = aside[ASKEW_END] = 0.0
-        angle += _open_angle(self, aside, 1.0, 0.0, 0.0, 2.0 * thick, thick)
+        angle += _open_angle(self, aside, 1.0, 0.0, 0.0, 0.0, 2.0 * thick, thick)
     return angle
 
 
-cdef double _open_angle(
-    Cleared self, double* move, double length, double low, double high, double grow, double thick
+cdef double _bound(
+    Cleared self, double* move, double length, double low, double high, double thick
 ) noexcept nogil:
-    """Return the angle of the front half of the tool's circle, in the middle of a stretch of a
-    move, that no earlier move has cleared with a tool wider by `grow`, or by `grow` less
-    `thick` on the last of its way."""
+    """Return a bound of the engagement wherever the tool is in a stretch of a move."""
+    cdef double half = 0.5 * (high - low), turn = _turn(move, length, half)
+    return _open_angle(self, move, length, low + half, half, turn, thick - half, thick)
+
+
+cdef inline double _turn(double* move, double length, double part) noexcept nogil:
+    """Return the angle, rad, by which the tool turns on a part of a move."""
+    return part / length * math.fabs(move[ASKEW_END] - move[ASKEW])
+
+
+cdef inline bint _is_finest(double* move, double length, double half, double thick) noexcept nogil:
+    """Return True if a stretch of this half length is not halved."""
+    return half <= FINEST * thick and _turn(move, length, half) <= FINEST_TURN
+
+
+cdef double _value(
+    Cleared self, double* move, double length, double place, double thick
+) noexcept nogil:
+    """Return the engagement at a place of a move."""
+    return _open_angle(self, move, length, place, 0.0, 0.0, thick, thick)
+
+
+cdef double _open_angle(
+    Cleared self, double* move, double length, double middle, double before, double turn,
+    double grow, double thick
+) noexcept nogil:
+    """Return the angle of the front half of the tool's circle, wider by `turn` at both ends, at a
+    place of a move, that no earlier move has cleared with a tool wider by `grow`, or by `grow` less
+    `thick` on the last of its way to a place that lies `before` that one."""
     cdef Arcs arcs
     cdef Front front
     cdef double ex = (move[BX] - move[AX]) / length, ey = (move[BY] - move[AY]) / length
-    cdef double middle = 0.5 * (low + high)
     cdef double askew = move[ASKEW] + middle / length * (move[ASKEW_END] - move[ASKEW])
-    cdef double c = math.cos(askew), s = math.sin(askew)
+    cdef double c = math.cos(askew), s = math.sin(askew), half = min(0.5 * PI + turn, PI)
     cdef Window window
     cdef double piece_end = -PI
     cdef int i
@@ -397,8 +425,8 @@ cdef double _open_angle(
     front.dx, front.dy = c * ex - s * ey, s * ex + c * ey
     front.angle, front.radius = math.atan2(front.dy, front.dx), move[RADIUS]
     front.level, front.grow, front.grow_recent = move[LOW] + LEVEL_MM, grow, grow - thick
-    front.recent = self.travelled + middle - RECENT * thick
-    arcs.count, arcs.changes, arcs.low[0], arcs.high[0] = 1, 0, -0.5 * PI, 0.5 * PI
+    front.recent = self.travelled + middle - before - RECENT * thick
+    arcs.count, arcs.changes, arcs.low[0], arcs.high[0] = 1, 0, -half, half
     _outside(self.box, &front, &arcs)
     while True:
         i = 0
@@ -413,7 +441,7 @@ cdef double _open_angle(
     for i in range(arcs.count):
         angle += arcs.high[i] - arcs.low[i]
     if self.from_right and arcs.count:
-        angle = arcs.high[arcs.count - 1] + 0.5 * PI
+        angle = arcs.high[arcs.count - 1] + half
     return angle if angle > NO_ANGLE else 0.0
 
 

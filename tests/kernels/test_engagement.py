@@ -30,9 +30,13 @@ def distances(points: Floats, move: Floats) -> Floats:
     return np.asarray(np.hypot(*(points - move[:2] - part * along).T))
 
 
-def engaged(moves: Floats, number: int, place: Floats, way: float, ways: Floats) -> float:
-    """The angle of the front half of the circle at a place that nothing before has cleared."""
-    heading = math.atan2(*(moves[number, 2:4] - moves[number, :2])[::-1])
+def engaged(moves: Floats, number: int, part: float, way: float, ways: Floats) -> float:
+    """The angle of the front half of the circle at a part of a move that nothing before has
+    cleared."""
+    travel = moves[number, 2:4] - moves[number, :2]
+    place = moves[number, :2] + part * travel
+    askew = (1.0 - part) * moves[number, 7] + part * moves[number, 8]
+    heading = math.atan2(*travel[::-1]) + askew
     angle = heading + (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS * math.pi - 0.5 * math.pi
     rim = place + moves[number, 4] * np.column_stack([np.cos(angle), np.sin(angle)])
     is_air = rim[:, 0] > WALL - THICK
@@ -45,32 +49,32 @@ def engaged(moves: Floats, number: int, place: Floats, way: float, ways: Floats)
 
 @st.composite
 def programs(draw: st.DrawFn) -> Floats:
-    """Up to a dozen moves in a row, of two tools, at three depths."""
+    """Up to a dozen moves in a row, of two tools, at three depths; some head as arcs do for which
+    they stand."""
     rng = np.random.default_rng(draw(st.integers(0, 10_000)))
     count = draw(st.integers(1, 12))
     points = rng.uniform(0.0, 10.0, (count + 1, 2))
     depth = rng.integers(-2, 1, count).astype(np.float64)
     radius = rng.choice([0.6, 1.0], count)
-    return np.column_stack(
-        [points[:-1], points[1:], radius, depth, depth, 0.0 * depth, 0.0 * depth]
-    )
+    askew = rng.uniform(-0.3, 0.3, (count, 2)) * draw(st.booleans())
+    return np.column_stack([points[:-1], points[1:], radius, depth, depth, askew])
 
 
-@examples(40, nightly=2_000)
-@given(programs())
-def test_no_place_is_engaged_by_more_than_the_bound(moves: Floats) -> None:
+@examples(80, nightly=2_000)
+@given(programs(), st.sampled_from([0.0, 1.0, math.pi]))
+def test_no_place_is_engaged_by_more_than_the_bound(moves: Floats, enough: float) -> None:
+    """The bound holds whether its stretches were halved or not."""
     box = np.array([-np.inf, -np.inf, WALL, np.inf])
     cleared = Cleared(np.array([[0.0, 0.0], [10.0, 10.0]]), 1.0, box)
-    bound = cleared.judge(moves, np.ones(len(moves), dtype=np.bool_), THICK, 0.0, 0.005)
+    bound = cleared.judge(moves, np.ones(len(moves), dtype=np.bool_), THICK, enough, 0.005)
     length = np.hypot(*(moves[:, 2:4] - moves[:, :2]).T)
     ways = np.cumsum(length)
     slack = 3.0 * math.pi / DIRECTIONS
     for number in range(len(moves)):
         greatest = 0.0
         for part in (np.arange(PLACES) + 0.5) / PLACES:
-            place = moves[number, :2] + part * (moves[number, 2:4] - moves[number, :2])
             way = ways[number] - (1.0 - part) * length[number]
-            greatest = max(greatest, engaged(moves, number, place, way, ways))
+            greatest = max(greatest, engaged(moves, number, part, way, ways))
         assert greatest <= bound[number] + slack
 
 
@@ -88,6 +92,25 @@ def test_beside_a_straight_cut_the_angle_is_that_of_its_width(share: float) -> N
     inner[0, 0], inner[0, 2] = 15.0, 5.0
     bound = cleared.judge(inner, np.ones(1, dtype=np.bool_), 1e-4, 0.0, 1e-3)
     assert bound[0] == pytest.approx(math.acos(1.0 - width), abs=4e-3)
+
+
+@pytest.mark.parametrize("ends", [(0.3, -0.3), (-0.3, 0.3), (0.3, 0.0)])
+@pytest.mark.parametrize("enough", [0.0, math.pi])
+def test_the_bound_of_a_move_holds_where_the_tool_heads_into_the_stock(
+    ends: tuple[float, float], enough: float
+) -> None:
+    """A short move for an arc, 0.1 beside a slot: at one end the tool heads away from the slot by
+    0.3, and cuts with so much more of its front than in the middle."""
+    rows = np.zeros((2, 9))
+    rows[:, :4] = [[0.0, 0.0, 20.0, 0.0], [10.0, 0.1, 10.02, 0.1]]
+    rows[:, 4], rows[1, 7:] = 1.0, ends
+    cleared = Cleared(
+        np.array([[0.0, 0.0], [20.0, 2.0]]), 1.0, np.full(4, np.inf) * [-1, -1, 1, 1]
+    )
+    cleared.add(rows[:1])
+    bound = cleared.judge(rows[1:], np.ones(1, dtype=np.bool_), 1e-3, enough, 1e-3)
+    thin, thick = (math.acos(1.0 - wide) + 0.3 for wide in (0.099, 0.1))
+    assert thin - 1e-9 <= bound[0] <= (thick + 5e-3 if enough == 0.0 else math.pi)
 
 
 def test_chips_almost_as_thick_as_what_does_not_count_are_not_taken_for_thick_ones() -> None:

@@ -10,7 +10,8 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats
 
-RECENT, FINEST, NO_ANGLE, LEVEL_MM, WAITING = 100.0, 1.0 / 16.0, 1e-7, 1e-6, 128
+RECENT, FINEST, FINEST_TURN = 100.0, 1.0 / 16.0, 1e-3
+NO_ANGLE, LEVEL_MM, WAITING = 1e-7, 1e-6, 128
 Interval = tuple[float, float]
 
 
@@ -82,13 +83,14 @@ class Cleared:
         while waiting:
             low, high = waiting.pop()
             half = 0.5 * (high - low)
-            bound = self.open_angle(move, length, low, high, thick - half, thick)
+            bound = self._bound(move, length, low, high, thick)
             if bound <= best:
                 continue
-            if bound <= least or half <= FINEST * thick or len(waiting) + 2 > WAITING:
+            is_finest = half <= FINEST * thick and turn_of(move, length, half) <= FINEST_TURN
+            if bound <= least or is_finest or len(waiting) + 2 > WAITING:
                 best = bound
                 continue
-            value = self.open_angle(move, length, low, high, thick, thick)
+            value = self.open_angle(move, length, low + half, thick, thick)
             if bound - value <= (coarse if bound <= enough else fine) < math.inf:
                 best = bound
                 continue
@@ -131,12 +133,14 @@ class Cleared:
         low, high = stretch
         half = 0.5 * (high - low)
         if length > 0.0:
-            bound = self.open_angle(move, length, low, high, thick - half, thick)
+            bound = self._bound(move, length, low, high, thick)
             if bound <= limit:
                 return None
-        if half <= FINEST * thick:
+        if length == 0.0 or (
+            half <= FINEST * thick and turn_of(move, length, half) <= FINEST_TURN
+        ):
             return low
-        is_above = self.open_angle(move, length, low, high, thick, thick) > limit
+        is_above = self.open_angle(move, length, low + half, thick, thick) > limit
         first = self._first_above(move, length, (low, low + half), thick, limit)
         if first is not None:
             return first
@@ -148,21 +152,37 @@ class Cleared:
         angle = 0.0
         for side in (-1.0, 1.0):
             aside = [*move[:2], move[0] + side, move[1], *move[4:7], 0.0, 0.0]
-            angle += self.open_angle(aside, 1.0, 0.0, 0.0, 2.0 * thick, thick)
+            angle += self.open_angle(aside, 1.0, 0.0, 2.0 * thick, thick)
         return angle
 
-    def open_angle(
-        self, move: list[float], length: float, low: float, high: float, grow: float, thick: float
+    def _bound(
+        self, move: list[float], length: float, low: float, high: float, thick: float
     ) -> float:
-        """The open angle in the middle of a stretch of a move."""
+        """The bound of the engagement in a stretch of a move."""
+        half = 0.5 * (high - low)
+        turn = turn_of(move, length, half)
+        return self.open_angle(move, length, low + half, thick - half, thick, half, turn)
+
+    def open_angle(
+        self,
+        move: list[float],
+        length: float,
+        middle: float,
+        grow: float,
+        thick: float,
+        before: float = 0.0,
+        wider: float = 0.0,
+    ) -> float:
+        """The open angle at a place of a move, of a front that is wider by an angle at both ends;
+        the last of the way is that to a place that lies `before`."""
         ex, ey = (move[2] - move[0]) / length, (move[3] - move[1]) / length
-        middle = 0.5 * (low + high)
         x, y = move[0] + middle * ex, move[1] + middle * ey
         askew = move[7] + middle / length * (move[8] - move[7])
         c, s = math.cos(askew), math.sin(askew)
         turn = math.atan2(s * ex + c * ey, c * ex - s * ey)
-        recent = self.travelled + middle - RECENT * thick
-        arcs, radius = [(-0.5 * math.pi, 0.5 * math.pi)], move[4]
+        recent = self.travelled + middle - before - RECENT * thick
+        front = min(0.5 * math.pi + wider, math.pi)
+        arcs, radius = [(-front, front)], move[4]
         for cosine, about in (
             ((self.box[2] - grow - x) / radius, -turn),
             ((self.box[3] - grow - y) / radius, 0.5 * math.pi - turn),
@@ -185,8 +205,13 @@ class Cleared:
         for one, other in arcs:
             angle += other - one
         if self.from_right and arcs:
-            angle = arcs[-1][1] + 0.5 * math.pi
+            angle = arcs[-1][1] + front
         return angle if angle > NO_ANGLE else 0.0
+
+
+def turn_of(move: list[float], length: float, part: float) -> float:
+    """The angle by which the tool turns on a part of a move."""
+    return part / length * abs(move[8] - move[7])
 
 
 def cleared_by(
