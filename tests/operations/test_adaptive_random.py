@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from hypothesis import HealthCheck, assume, given
 from hypothesis import strategies as st
 
 from camtool.errors import CamtoolError
+from camtool.findings import Finding
 from camtool.geometry.polylines import Polyline
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry
@@ -25,7 +27,7 @@ from camtool.run import Run
 from camtool.stock.slides import slide_moves, tools_of_rows
 from camtool.target.registry import LoadedTarget, load_target
 from tests.operations.adaptive_programs import posted
-from tests.operations.test_adaptive import adaptive
+from tests.operations.test_adaptive import HELIX
 from tests.oracles.contours import SQUARE, closed, comb, gear, spiral, star
 from tests.oracles.engagement import (
     CHORD_SHARE,
@@ -53,8 +55,16 @@ THICK_OF_STEP = 0.2
 MAX_FRONTS = 999.0
 """Limits that make more fronts across a pocket are refused."""
 
-FINE_SHARE = 0.02
-"""Discs of this part of the tool's radius that fit in the tool centre region are cleared."""
+FINE_SHARE = 0.0206
+FINE_MM = 1.02e-3
+"""Discs of this part of the tool's radius, and so much more, that fit in the tool centre region
+are cleared within the limit; places that none of them reaches are as wide as the tool."""
+
+NARROW_SLACK = 0.05
+"""Places nearer than this part of such a disc to where it reaches may be taken as either."""
+
+WALL_MM = 1.5e-3
+"""Programs are rounded: they may cut so much into a wall."""
 
 DEEP_SHARE = 0.01
 """Uncut strips up to twice this part of the tool's radius wide are the scallop."""
@@ -151,6 +161,39 @@ def with_tool(
     return Case(paths, radius, draw(st.floats(least, 0.5 * math.pi)))
 
 
+def fine_mm(case: Case) -> float:
+    """Return the radius of the discs of tool centres that are cleared within the limit, mm."""
+    return FINE_MM + FINE_SHARE * case.radius_mm
+
+
+def wide_centres(case: Case, slack: float) -> shapely.Geometry:
+    """Return the places of the tool's centre that fine discs reach, and those nearer to them than
+    a part of these discs (below 0: only places that are farther within)."""
+    fine = fine_mm(case)
+    middles = shapely.buffer(area_of(region_of(case.paths)), -case.radius_mm - fine, quad_segs=200)
+    return shapely.buffer(middles, fine * (1.0 + slack), quad_segs=200)
+
+
+def slot_faults(case: Case, places: list[tuple[float, float]], words: list[str]) -> list[str]:
+    """Return the faults of the places that are named as slots: `words` of engagements too high in
+    slots where none is named, and names of slots in which a limit can be kept."""
+    within = wide_centres(case, -NARROW_SLACK)
+    wide = [place for place in places if shapely.intersects_xy(within, *place)]
+    return [*([] if places else words), *(f"{place} is named as a slot" for place in wide)]
+
+
+def slots_named(findings: Iterable[Finding]) -> list[tuple[float, float]]:
+    """Return the places of the slots that findings name as cut with all of the tool."""
+    named = [each.where for each in findings if each.code.name == "SLOT_AS_WIDE"]
+    return [_place_of(where) for where in named]
+
+
+def _place_of(where: str) -> tuple[float, float]:
+    """Return the x and y mm at the end of the text that names a place."""
+    x, y = map(float, re.findall(r"-?[\d.]+", where)[-2:])
+    return x, y
+
+
 def thick_share(case: Case) -> float:
     """Return the thickness up to which chips do not count, over the tool's radius."""
     return min(THICK_SHARE, THICK_OF_STEP * (1.0 - math.cos(case.limit)))
@@ -158,21 +201,23 @@ def thick_share(case: Case) -> float:
 
 def too_high(
     case: Case, stock: Stock, runs: list[CutRun], every: float, phase: float
-) -> list[str]:
-    """Return the places where the engagement is above its limit; and those where the tool comes
-    down into stock, but for helices."""
+) -> tuple[list[str], list[str]]:
+    """Return the places where the engagement is above its limit, and those where the tool comes
+    down into stock, but for helices: first those of slots as wide as the tool, then all others."""
     radius = case.radius_mm
     lines = [chords_of(run.vertices, CHORD_SHARE * radius) for run in runs]
     stays = stays_of(lines, -1.0)
     is_helix = [len(stay.down) > 0 and stay.down[0, 2] == 0.0 for stay in stays]
-    words = []
+    wide = wide_centres(case, NARROW_SLACK)
+    in_slots, others = list[str](), list[str]()
     for place in engagements(stock, stays, every * radius, phase):
         if is_helix[place.stay] and place.travelled_mm <= math.tau * radius:
             continue
         limit = DOWN_RAD if math.isnan(place.heading) else TOLERATED * case.limit
         if place.angle > limit:
-            words.append(_words(place, case.limit))
-    return words
+            is_wide = shapely.intersects_xy(wide, place.x, place.y)
+            (others if is_wide else in_slots).append(_words(place, case.limit))
+    return in_slots, others
 
 
 def _words(place: Place, limit: float) -> str:
@@ -183,10 +228,8 @@ def _words(place: Place, limit: float) -> str:
 
 def uncut(case: Case, stock: Stock) -> list[str]:
     """Return the places that stay uncut beyond the scallop."""
-    radius, fine = case.radius_mm, FINE_SHARE * case.radius_mm
-    area = area_of(region_of(case.paths))
-    centres = shapely.buffer(area, -radius - fine, quad_segs=200)
-    reached = shapely.buffer(centres, fine + radius, quad_segs=200)
+    radius = case.radius_mm
+    reached = shapely.buffer(wide_centres(case, 0.0), radius, quad_segs=200)
     deep = shapely.buffer(stock.remaining(reached), -DEEP_SHARE * radius)
     return [
         f"{part.area:.3g} mm² about {shapely.get_coordinates(part.centroid)[0].round(4).tolist()}"
@@ -197,14 +240,24 @@ def uncut(case: Case, stock: Stock) -> list[str]:
 
 def faults(case: Case, every: float, phase: float) -> list[str]:
     """Return the faults of an adaptive pocket, looked at at places `every` tool radii apart."""
-    return faults_of(adaptive(case.paths, 2.0 * case.radius_mm, case.limit), case, every, phase)
+    own = (("strategy", "adaptive"), ("engagement_rad", case.limit))
+    work = work_of(case.paths, 2.0 * case.radius_mm, own=own, entry=HELIX)
+    return faults_of(runs_of(work), case, every, phase, slots_named(work.findings))
 
 
-def faults_of(runs: list[CutRun], case: Case, every: float, phase: float) -> list[str]:
+def faults_of(
+    runs: list[CutRun],
+    case: Case,
+    every: float,
+    phase: float,
+    slots: list[tuple[float, float]] | None = None,
+) -> list[str]:
     stock = Stock(case.radius_mm, case.radius_mm * thick_share(case))
+    in_slots, others = too_high(case, stock, runs, every, phase)
     return [
         *gouges(runs, region_of(case.paths), case.radius_mm),
-        *too_high(case, stock, runs, every, phase),
+        *others,
+        *slot_faults(case, slots or [], in_slots),
         *uncut(case, stock),
     ]
 
@@ -263,28 +316,35 @@ STOCK_FAULTS = {
 def job_faults(case: Case, target: LoadedTarget, folder: Path) -> list[str]:
     """Return what the stock simulator finds wrong with a program, but for the scallop in corners
     (MATERIAL_LEFT), which the oracle judges; and what is wrong with what it says of the
-    engagement: that is either kept, or truly exceeded on the predicted slides."""
+    engagement: that is either kept, or a little exceeded on the predicted slides, or a slot that
+    is named is as wide as the tool."""
     run = posted(case.paths, 2.0 * case.radius_mm, case.limit, target, folder)
     names = {finding.code.name for finding in run.findings}
     told = names & {"ENGAGEMENT_KEPT", "ENGAGEMENT_TOO_HIGH"}
     words = sorted(names & STOCK_FAULTS)
     stock = Stock(case.radius_mm, 0.0)
+    walls = shapely.boundary(area_of(region_of(case.paths)))
+    shapely.prepare(walls)
     for line in lines_of(run.decoded, CHORD_SHARE * case.radius_mm):
-        deep = line[line[:, 2] <= -1.0 + LEVEL_EPS_MM]
+        deep = line[line[:, 2] <= -1.0 + LEVEL_EPS_MM][:, :2]
         for first in range(0, len(deep), CUT_POINTS):
-            stock.cut(deep[first : first + CUT_POINTS + 1, :2])
+            stock.cut(deep[first : first + CUT_POINTS + 1])
+        near = shapely.dwithin(walls, shapely.points(deep), case.radius_mm - WALL_MM)
+        words += [f"cuts into the wall at {place}" for place in deep[near].tolist()[:1]]
     words += uncut(case, stock)
     if len(told) != 1:
         words.append(f"{sorted(told)} of the engagement")
+    slots, in_slots = slots_named(run.findings), list[str]()
     for finding in run.findings:
         if finding.code.name == "ENGAGEMENT_TOO_HIGH":
-            x, y = map(float, re.findall(r"-?[\d.]+", finding.where))
-            angle = greatest_on_slides(run, case, (x, y))
-            if angle <= case.limit:
-                words.append(
-                    f"{finding.measured}° at {x} {y}; {math.degrees(angle)}° by the oracle"
-                )
-    return words
+            place = _place_of(finding.where)
+            angle = greatest_on_slides(run, case, place)
+            what = f"{finding.measured}° at {place}; {math.degrees(angle):.3f}° by the oracle"
+            if not shapely.intersects_xy(wide_centres(case, NARROW_SLACK), *place):
+                in_slots.append(what)
+            elif not case.limit < angle <= TOLERATED * case.limit:
+                words.append(f"{what}, of {math.degrees(case.limit):.3f}°")
+    return words + slot_faults(case, slots, in_slots)
 
 
 def greatest_on_slides(run: Run, case: Case, at_mm: tuple[float, float]) -> float:
