@@ -384,9 +384,10 @@ cdef double _all_round(Cleared self, double* move, double thick) noexcept nogil:
 cdef double _bound(
     Cleared self, double* move, double length, double low, double high, double thick
 ) noexcept nogil:
-    """Return a bound of the engagement wherever the tool is in a stretch of a move."""
+    """Return a bound of the engagement wherever the tool is in a stretch of a move: nowhere more
+    than half of the circle, which is all that faces where the tool goes."""
     cdef double half = 0.5 * (high - low), turn = _turn(move, length, half)
-    return _open_angle(self, move, length, low + half, half, turn, thick - half, thick)
+    return min(_open_angle(self, move, length, low + half, half, turn, thick - half, thick), PI)
 
 
 cdef inline double _turn(double* move, double length, double part) noexcept nogil:

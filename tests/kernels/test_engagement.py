@@ -113,6 +113,18 @@ def test_the_bound_of_a_move_holds_where_the_tool_heads_into_the_stock(
     assert thin - 1e-9 <= bound[0] <= (thick + 5e-3 if enough == 0.0 else math.pi)
 
 
+@pytest.mark.parametrize("ends", [(0.0, 0.0), (0.3, -0.3), (-0.2, 0.1)])
+def test_a_slot_in_full_stock_engages_half_of_the_circle_and_never_more(
+    ends: tuple[float, float],
+) -> None:
+    rows = np.array([[10.0, 1.0, 10.02, 1.0, 1.0, 0.0, 0.0, *ends]])
+    cleared = Cleared(
+        np.array([[0.0, 0.0], [20.0, 2.0]]), 1.0, np.full(4, np.inf) * [-1, -1, 1, 1]
+    )
+    bound = cleared.judge(rows, np.ones(1, dtype=np.bool_), 1e-3, 0.0, 1e-3)
+    assert bound[0] == math.pi
+
+
 def test_chips_almost_as_thick_as_what_does_not_count_are_not_taken_for_thick_ones() -> None:
     """Beside a slot, 0.03 wide, with chips of 0.02 that do not count: as a cut 0.01 wide."""
     rows = np.zeros((2, 9))

@@ -158,10 +158,11 @@ class Cleared:
     def _bound(
         self, move: list[float], length: float, low: float, high: float, thick: float
     ) -> float:
-        """The bound of the engagement in a stretch of a move."""
+        """The bound of the engagement in a stretch of a move: at most half of the circle."""
         half = 0.5 * (high - low)
         turn = turn_of(move, length, half)
-        return self.open_angle(move, length, low + half, thick - half, thick, half, turn)
+        angle = self.open_angle(move, length, low + half, thick - half, thick, half, turn)
+        return min(angle, math.pi)
 
     def open_angle(
         self,
