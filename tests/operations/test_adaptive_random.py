@@ -63,6 +63,13 @@ are cleared within the limit; places that none of them reaches are as wide as th
 NARROW_SLACK = 0.05
 """Places nearer than this part of such a disc to where it reaches may be taken as either."""
 
+STEPS_WIDE = 30.0
+"""Discs of so many times what the slides go beside their path: where none of them fits, turns are
+as tight as the steps of the machine are long."""
+
+SURE_RAD = math.radians(1.0)
+"""The oracle's angle on slides is right within this."""
+
 WALL_MM = 1.5e-3
 """Programs are rounded: they may cut so much into a wall."""
 
@@ -166,10 +173,11 @@ def fine_mm(case: Case) -> float:
     return FINE_MM + FINE_SHARE * case.radius_mm
 
 
-def wide_centres(case: Case, slack: float) -> shapely.Geometry:
-    """Return the places of the tool's centre that fine discs reach, and those nearer to them than
-    a part of these discs (below 0: only places that are farther within)."""
-    fine = fine_mm(case)
+def wide_centres(case: Case, slack: float, least_mm: float = 0.0) -> shapely.Geometry:
+    """Return the places of the tool's centre that fine discs reach, or discs of a radius if they
+    are wider, and those nearer to them than a part of these discs (below 0: only places that are
+    farther within)."""
+    fine = max(fine_mm(case), least_mm)
     middles = shapely.buffer(area_of(region_of(case.paths)), -case.radius_mm - fine, quad_segs=200)
     return shapely.buffer(middles, fine * (1.0 + slack), quad_segs=200)
 
@@ -316,8 +324,8 @@ STOCK_FAULTS = {
 def job_faults(case: Case, target: LoadedTarget, folder: Path) -> list[str]:
     """Return what the stock simulator finds wrong with a program, but for the scallop in corners
     (MATERIAL_LEFT), which the oracle judges; and what is wrong with what it says of the
-    engagement: that is either kept, or a little exceeded on the predicted slides, or a slot that
-    is named is as wide as the tool."""
+    engagement: that is either kept, or a little exceeded on the predicted slides, and more only
+    where the steps of the machine are coarse, or a slot that is named is as wide as the tool."""
     run = posted(case.paths, 2.0 * case.radius_mm, case.limit, target, folder)
     names = {finding.code.name for finding in run.findings}
     told = names & {"ENGAGEMENT_KEPT", "ENGAGEMENT_TOO_HIGH"}
@@ -338,17 +346,25 @@ def job_faults(case: Case, target: LoadedTarget, folder: Path) -> list[str]:
     for finding in run.findings:
         if finding.code.name == "ENGAGEMENT_TOO_HIGH":
             place = _place_of(finding.where)
-            angle = greatest_on_slides(run, case, place)
+            angle, beside_mm = greatest_on_slides(run, case, place)
             what = f"{finding.measured}° at {place}; {math.degrees(angle):.3f}° by the oracle"
             if not shapely.intersects_xy(wide_centres(case, NARROW_SLACK), *place):
                 in_slots.append(what)
-            elif not case.limit < angle <= TOLERATED * case.limit:
+                continue
+            wide = wide_centres(case, NARROW_SLACK, STEPS_WIDE * beside_mm)
+            if shapely.intersects_xy(wide, *place):
+                is_right = case.limit < angle <= TOLERATED * case.limit
+            else:
+                assert finding.measured is not None
+                is_right = angle <= math.radians(finding.measured) + SURE_RAD
+            if not is_right:
                 words.append(f"{what}, of {math.degrees(case.limit):.3f}°")
     return words + slot_faults(case, slots, in_slots)
 
 
-def greatest_on_slides(run: Run, case: Case, at_mm: tuple[float, float]) -> float:
-    """Return the greatest engagement, by the oracle, of the slides near a place."""
+def greatest_on_slides(run: Run, case: Case, at_mm: tuple[float, float]) -> tuple[float, float]:
+    """Return the greatest engagement, by the oracle, of the slides near a place behind the entry,
+    and how far the slides go beside their path, mm."""
     slides = slide_moves(run.decoded, run.target, tools_of_rows(run.decoded, run.job))
     radius, lines = case.radius_mm, [list[list[float]]()]
     rows = zip(slides.start.tolist(), slides.end.tolist(), slides.rapid.tolist(), strict=True)
@@ -364,9 +380,10 @@ def greatest_on_slides(run: Run, case: Case, at_mm: tuple[float, float]) -> floa
     angles = [
         place.angle
         for place in places
-        if math.dist((place.x, place.y), at_mm) < near and not math.isnan(place.heading)
+        if math.dist((place.x, place.y), at_mm) < near
+        and place.travelled_mm > math.tau * radius * (place.stay == 0)
     ]
-    return max(angles, default=0.0)
+    return max(angles, default=0.0), slides.beside_mm
 
 
 @pytest.mark.slow

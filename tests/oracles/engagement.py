@@ -225,8 +225,12 @@ def engagements(
                 stock.cut(_between(points, reach, done, old))
                 done = old
             start, end = points[row], points[row + 1]
-            heading = math.atan2(end[1] - start[1], end[0] - start[0])
             place = start + share * (end - start)
+            if focus is not None:
+                # Steps of a machine are shorter than what is swept behind them is cut off by.
+                about = travelled + np.array([-behind_mm, behind_mm])
+                start, end = np.column_stack([np.interp(about, reach, xy) for xy in points.T])
+            heading = math.atan2(end[1] - start[1], end[0] - start[0])
             recent = _between(points, reach, done, max(travelled - behind_mm, 0.0))
             angle = stock.engagement(place, heading, recent)
             yield Place(*place.tolist(), heading, travelled, number, angle)
