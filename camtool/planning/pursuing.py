@@ -45,9 +45,10 @@ MARGIN_SHARE = 0.5
 CELL_SHARE = 1.0 / 12.0
 """Distance of grid points over the tool's radius."""
 
-TURN_SHARES = (0.5, 0.1)
-"""Radii of the tightest turn over the tool's radius, one after the other: places that are too
-narrow for one of them are left to the next."""
+TURN_SHARE = 0.5
+TIGHT_TURN_SHARE = 0.1
+"""Radii of the tightest turn over the tool's radius, at first and then: places that are too narrow
+for one of them are left to the other."""
 
 SHARES = ((0.96, 0.92), (0.85, 0.75), (0.6, 0.5))
 """Parts of the limit that strokes are planned with, and beside walls, where the engagement rises
@@ -164,15 +165,23 @@ def joined(path: Floats, other: Floats) -> Floats:
 
 
 class Pursued:
-    """The clearing of one region by pursuit: its stays so far.
+    """The clearing of one region by pursuit: its stays so far. `turn_share`: the tightest turn at
+    first.
 
     `ring` and `first`: closed and open paths (n, 3) that have cut, the way down and what widens
     it; the first stay begins with the second of them.
     """
 
     def __init__(
-        self, region: Polylines, ring: Floats, first: Floats, tool_mm: float, limit: float
+        self,
+        region: Polylines,
+        ring: Floats,
+        first: Floats,
+        tool_mm: float,
+        limit: float,
+        turn_share: float,
     ):
+        self.turn_shares = (turn_share, TIGHT_TURN_SHARE)
         self.region, self.ring, self.tool_mm, self.limit = region, ring, tool_mm, limit
         step = 1.0 - math.cos(limit)
         self.thick_mm = min(THICK_SHARE, THICK_OF_STEP * step) * tool_mm
@@ -202,7 +211,7 @@ class Pursued:
         """Make all strokes, with tighter and tighter turns."""
         corners = corners_of(self.region, ROUND_SHARE * self.tool_mm)
         self.reach_mm2 = float(signed_areas(offset_shape(self.region, -self.tool_mm)).sum())
-        for share in TURN_SHARES:
+        for share in self.turn_shares:
             self.pursue(share * self.tool_mm)
             self.cut_corners(corners)
         self.skim_walls()
@@ -234,7 +243,7 @@ class Pursued:
         while (pieces := pursuit.begin(self.pose[0], self.pose[1])) is not None:
             best, piece = pieces
             # Found before the stroke is cut: the way must not lead through what that clears.
-            link = self.link_to(pursuit.pose(piece), max(turn_mm, TURN_SHARES[0] * self.tool_mm))
+            link = self.link_to(pursuit.pose(piece), max(turn_mm, TURN_SHARE * self.tool_mm))
             if not self.cut_stroke(piece, Approach(NO_PATH, True) if link is None else link):
                 pursuit.give_up(best)
 
@@ -360,7 +369,7 @@ class Pursued:
             lengths = np.sort([wall.nearest_to((x, y)) for x, y in own.tolist()])
             for low, high in stretches(lengths, wall, SKIM_SHARE * self.tool_mm):
                 stroke = wall.piece(low, high)
-                approach = self.approach_to(stroke, TURN_SHARES[0] * self.tool_mm)
+                approach = self.approach_to(stroke, TURN_SHARE * self.tool_mm)
                 if approach is not None:
                     self.cut_path(approach, stroke)
 

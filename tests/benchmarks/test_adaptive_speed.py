@@ -3,8 +3,9 @@
 Run it by `pytest -m benchmark -s tests/benchmarks/test_adaptive_speed.py`. FreeCAD's planner is
 its own library in a process of its own. One formula is the clock of both: cuts at one feed, links
 at depth at another, and for each time the tool comes up the way there, up and down at the rate of
-rapids; accelerations are left out, and so is the way down into the stock. camtool's limit is the
-greatest engagement of FreeCAD's cuts, measured by the kernel that proves ours.
+rapids; accelerations are left out, and so is the way down into the stock but for the level turn at
+its end, which FreeCAD's programs make too (Mod/Path/PathScripts/PathAdaptive.py). camtool's limit
+is the greatest engagement of FreeCAD's cuts, measured by the kernel that proves ours.
 """
 
 from __future__ import annotations
@@ -126,6 +127,7 @@ def peer_travel(shape: Shape) -> tuple[float, Travel]:
             [np.cos(angle), np.sin(angle)]
         )
         stays.append((ring, np.zeros(len(ring) - 1, dtype=np.bool_)))
+        cut += length_of(ring)
         is_first, at = True, ring[-1]
         for kind, way in ways:
             points = np.array([at, *way])

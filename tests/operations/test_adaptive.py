@@ -19,7 +19,7 @@ from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.adaptive import adaptive_legs, spiral
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry, Job, Operation, Tool
-from camtool.planning.pursuing import Approach, Pursued
+from camtool.planning.pursuing import TURN_SHARE, Approach, Pursued
 from camtool.planning.strategies import engagement
 from camtool.planning.strokes import (
     Pose,
@@ -328,7 +328,7 @@ def pursued(path: Polyline, tool_mm: float, limit: float) -> Pursued:
     region = offset_shape(region_of([path]), tool_mm)
     ring = np.array([[5.5, 5.0, 1.0], [4.5, 5.0, 1.0], [5.5, 5.0, 0.0]])
     first = spiral(np.array([5.0, 5.0]), 0.5, 2.0, tool_mm, limit)
-    return Pursued(region, ring, first, tool_mm, limit)
+    return Pursued(region, ring, first, tool_mm, limit, TURN_SHARE)
 
 
 def test_a_stroke_counts_only_if_the_way_to_it_stays_in_the_region() -> None:
