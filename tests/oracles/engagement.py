@@ -148,7 +148,8 @@ def _difference(one: shapely.Geometry, other: shapely.Geometry) -> shapely.Geome
     try:
         return shapely.difference(one, other)
     except shapely.errors.GEOSException:
-        return shapely.difference(one, other, grid_size=1e-9)
+        one, other = shapely.make_valid(one), shapely.make_valid(other)
+        return shapely.difference(one, other, grid_size=1e-8)
 
 
 def chords_of(rows: Floats, sagitta_mm: float) -> Floats:
