@@ -355,7 +355,8 @@ def job_faults(case: Case, target: LoadedTarget, folder: Path) -> list[str]:
             assert finding.measured is not None
             what = f"{finding.measured}° at {place}; {math.degrees(angle):.3f}° by the oracle"
             wide = wide_centres(case, NARROW_SLACK)
-            if finest_mm(run, place, NEAR_SHARE * case.radius_mm) <= STEPS_WIDE * beside_mm:
+            coarse_mm = STEPS_WIDE * beside_mm
+            if finest_mm(run, place, max(NEAR_SHARE * case.radius_mm, coarse_mm)) <= coarse_mm:
                 unsure = math.atan2(beside_mm, BEHIND_SHARE * case.radius_mm)
                 is_right = angle <= math.radians(finding.measured) + unsure
             elif shapely.dwithin(wide, shapely.Point(place), beside_mm):
@@ -395,10 +396,13 @@ def finest_mm(run: Run, at_mm: tuple[float, float], near_mm: float) -> float:
     """Return the least of the radii of the arcs and the lengths of the lines of a program that
     begin or end near a place, mm."""
     return min(
-        math.dist(move.start[:2], move.centre or move.end[:2])
-        for move in run.decoded
-        if move.kind != Kind.RAPID
-        and min(math.dist(move.start[:2], at_mm), math.dist(move.end[:2], at_mm)) < near_mm
+        (
+            math.dist(move.start[:2], move.centre or move.end[:2])
+            for move in run.decoded
+            if move.kind != Kind.RAPID
+            and min(math.dist(move.start[:2], at_mm), math.dist(move.end[:2], at_mm)) < near_mm
+        ),
+        default=math.inf,
     )
 
 
