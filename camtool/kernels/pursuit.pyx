@@ -123,6 +123,18 @@ cdef class Pursuit:
             before = _add_bulge(self, &rows[i, 0], &rows[i + 1, 0], before)
         self.logged = 0
 
+    def ends(self) -> Floats:
+        """Return the places (n, 2) at the ends of all pieces."""
+        return np.array(self.pieces[:self.count, BX:CX])
+
+    def leave_out(self, is_out: Bools) -> None:
+        """Begin no stroke about those of all pieces that are out: walls are seen from within the
+        region alone."""
+        cdef Int i
+        for i in range(self.count):
+            if is_out[i]:
+                self.dead[i] = 2
+
     def begin_level(self, turn_mm: float) -> None:
         """Turn by this radius at least, and look everywhere for strokes again."""
         cdef Int i

@@ -351,12 +351,9 @@ class _Clearing:
         return False
 
     def add_air(self, clear: Polylines) -> None:
-        """Take it that the tool has been at all places of a region: once round its rings."""
-        while len(clear):
-            for ring in clear:
-                closed = np.concatenate([ring.vertices, ring.vertices[:1] * [1.0, 1.0, 0.0]])
-                self.cleared.add(self.moves(closed))
-            clear = offset_shape(clear, self.tool_mm)
+        """Take it that the tool has been at all places of a region."""
+        for ring in _rings_of(clear, self.tool_mm):
+            self.cleared.add(self.moves(ring))
 
     def moves(self, vertices: Floats, sagitta_share: float = SAGITTA_SHARE) -> Floats:
         """Return (K, 9) the moves of an open path, as `camtool.kernels.engagement` wants them."""
@@ -439,8 +436,9 @@ class _Clearing:
         return numbers[0], None
 
     def older_ones(self) -> tuple[list[int], list[list[int]]]:
-        """Return for each stroke the number of strokes of older fronts near enough to matter,
-        and the newer strokes for which it matters itself."""
+        """Return for each stroke the number of strokes it waits for, and the newer ones that wait
+        for it: in each cell near it the last front before its own. That one waits for the front
+        before it in the cell, and so on: all older strokes near enough to matter are cut first."""
         if not self.strokes:
             return [], []
         cell = 2.0 * self.tool_mm
@@ -450,20 +448,23 @@ class _Clearing:
         column, row = np.floor(np.concatenate(places) / cell).astype(np.int64).T
         wide = int(np.ptp(column)) + 3
         key = (row - row.min()) * wide + column - column.min() + wide + 1
-        own = np.unique(np.column_stack([key, stroke]), axis=0)
+        own = np.unique(np.column_stack([key, front[stroke], stroke]), axis=0)
+        every = int(front.max()) + 1
+        age = own[:, 0] * every + own[:, 1]
         shifts = [dy * wide + dx for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
-        near = np.unique(np.concatenate([own + np.array([shift, 0]) for shift in shifts]), axis=0)
-        first, last = (
-            np.searchsorted(own[:, 0], near[:, 0], side=side) for side in ("left", "right")
-        )
-        pairs = set[tuple[int, int]]()
-        for newer, low, high in zip(
-            near[:, 1].tolist(), first.tolist(), last.tolist(), strict=True
-        ):
-            others = own[low:high, 1]
-            pairs |= {(one, newer) for one in others[front[others] < front[newer]].tolist()}
+        pairs = [np.empty((0, 2), dtype=np.int64)]
+        for shift in shifts:
+            near = np.searchsorted(age, age + shift * every)
+            has_older = near > 0
+            has_older[has_older] &= own[near[has_older] - 1, 0] == own[has_older, 0] + shift
+            newer, last = np.flatnonzero(has_older), near[has_older]
+            first = np.searchsorted(age, age[last - 1])
+            count = last - first
+            part = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+            older = own[np.repeat(first, count) + part, 2]
+            pairs.append(np.column_stack([older, np.repeat(own[newer, 2], count)]))
         waits, followers = [0] * len(self.strokes), [list[int]() for _ in self.strokes]
-        for one, other in sorted(pairs):
+        for one, other in np.unique(np.concatenate(pairs), axis=0).tolist():
             waits[other] += 1
             followers[one].append(other)
         return waits, followers
@@ -540,8 +541,10 @@ def adaptive_legs(
     clear = _places_in_air(air, tool_mm)
     clearing = _Clearing(region, tool_mm, limit)
     clearing.add_air(clear)
+    been = list(_rings_of(clear, tool_mm))
     min_mm = MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm
-    centre, room = _widest(region)
+    centre, widest_mm = _widest(region)
+    room = widest_mm
     if room < min_mm:
         return AdaptiveStays(centre, 0.0, [])
     parts = parts_of(clear)
@@ -573,9 +576,11 @@ def adaptive_legs(
         opening = FIRST_SHARE * room
         clear = Polylines.of([_circle(centre, room)])
     plans, is_complete = list[list[list[Leg]]](), False
-    if first is not None and not len(air) and room >= PURSUED_ROOM_SHARE * tool_mm:
-        ways = np.array(_ring(centre, begin_mm)), first
-        plans, is_complete = _plans_by_pursuit(region, ways, room, tool_mm, limit)
+    if widest_mm >= PURSUED_ROOM_SHARE * tool_mm:
+        if helix:
+            been.append(np.array(_ring(centre, begin_mm)))
+        begin = first if helix else None
+        plans, is_complete = _plans_by_pursuit(region, been, begin, widest_mm, tool_mm, limit)
     if not is_complete:
         full_region, widest = region, max(opening, room)
         if len(air):
@@ -588,18 +593,24 @@ def adaptive_legs(
 
 
 def _plans_by_pursuit(
-    region: Polylines, ways: tuple[Floats, Floats], room: float, tool_mm: float, limit: float
+    region: Polylines,
+    been: Sequence[Floats],
+    first: Floats | None,
+    room: float,
+    tool_mm: float,
+    limit: float,
 ) -> tuple[list[list[list[Leg]]], bool]:
     """Return the stays of pursuits in a region that leave nothing, and True; where there is none
     those of the one that leaves least, completed by fronts if they have a place to begin, and
-    False. It begins behind a spiral, the second of two ways; or in a narrow region behind the
-    first, the ring that is its beginning, once with wide turns and once with tight ones."""
-    ring, widened = ways
+    False. `been`: paths that have cut, the last of them the ring of the way down if it is widened
+    by a spiral, `first`: narrow regions are pursued from the ring, once with wide turns and once
+    with tight ones."""
     is_narrow = room < NARROW_SHARE * tool_mm
+    if is_narrow and first is not None:
+        first = been[-1]
     tried = list[tuple[Pursued, Floats]]()
     for turn_share in NARROW_TURN_SHARES if is_narrow else (TURN_SHARE,):
-        first = ring if is_narrow else widened
-        pursuit = Pursued(region, ring, first, tool_mm, limit, turn_share)
+        pursuit = Pursued(region, been, first, tool_mm, limit, turn_share)
         pursuit.run()
         tried.append((pursuit, pursuit.stock_left()))
     complete = [pursuit.stays for pursuit, points in tried if len(points) == 0]
@@ -636,9 +647,11 @@ def _completed(pursuit: Pursued, points: Floats) -> list[list[Leg]] | None:
         strokes += fronts(part, begin, (opening, opening), tool_mm, limit, clear)
     clearing = _Clearing(region, tool_mm, limit)
     legs = [leg for stay in pursuit.stays for leg in stay]
-    for path in (pursuit.ring, *(leg.vertices for leg in legs[:-1])):
+    for path in (*pursuit.been, *(leg.vertices for leg in legs[:-1])):
         clearing.cleared.add(clearing.moves(path))
     clearing.take(strokes)
+    if not legs:
+        return list(clearing.legs(None))
     first, *others = clearing.legs(legs[-1].vertices)
     return [*pursuit.stays[:-1], [*pursuit.stays[-1][:-1], *first], *others]
 
@@ -698,6 +711,14 @@ def stays_of_chambers(
     last = each[-1]
     last_stays = [*last.stays[:-1], [*last.stays[-1][:-1], *rest[0]], *rest[1:]]
     return [*each[:-1], AdaptiveStays(last.centre, last.helix_mm, last_stays)]
+
+
+def _rings_of(clear: Polylines, tool_mm: float) -> Iterator[Floats]:
+    """Yield open paths (n, 3) on which a tool clears all places of a region."""
+    while len(clear):
+        for ring in clear:
+            yield np.concatenate([ring.vertices, ring.vertices[:1] * [1.0, 1.0, 0.0]])
+        clear = offset_shape(clear, tool_mm)
 
 
 def _places_in_air(air: Polylines, tool_mm: float) -> Polylines:

@@ -165,24 +165,25 @@ def joined(path: Floats, other: Floats) -> Floats:
 
 
 class Pursued:
-    """The clearing of one region by pursuit: its stays so far. `turn_share`: the tightest turn at
-    first.
+    """The clearing of one region by pursuit: its stays so far.
 
-    `ring` and `first`: closed and open paths (n, 3) that have cut, the way down and what widens
-    it; the first stay begins with the second of them.
+    `been`: open paths (n, 3) that have cut, the way down or rings in what is air; `first`: the
+    path on which the first stay begins behind the way down, or None: it begins in air, as all
+    others do. `turn_share`: the tightest turn at first.
     """
 
     def __init__(
         self,
         region: Polylines,
-        ring: Floats,
-        first: Floats,
+        been: Sequence[Floats],
+        first: Floats | None,
         tool_mm: float,
         limit: float,
         turn_share: float,
     ):
         self.turn_shares = (turn_share, TIGHT_TURN_SHARE)
-        self.region, self.ring, self.tool_mm, self.limit = region, ring, tool_mm, limit
+        self.region, self.tool_mm, self.limit = region, tool_mm, limit
+        self.been = [*been, *([] if first is None else [first])]
         step = 1.0 - math.cos(limit)
         self.thick_mm = min(THICK_SHARE, THICK_OF_STEP * step) * tool_mm
         boxes = path_extents(region)
@@ -198,13 +199,14 @@ class Pursued:
             min(SKIN_SHARE, SKIN_OF_STEP * step) * tool_mm,
             CELL_SHARE * tool_mm,
         )
-        self.pursuit.add(ring)
-        self.pursuit.add(first)
-        self.stays = [[Leg(first)]]
+        self.stays = [] if first is None else [[Leg(first)]]
+        for path in self.been:
+            self.pursuit.add(path)
+        self.pursuit.leave_out(~inside(self.pursuit.ends(), Segments.of(region)))
         self.pose = self.pursuit.pose(self.pursuit.size - 1)
         nowhere = np.array([-np.inf, -np.inf, np.inf, np.inf])
         self.cleared = Cleared(self.extents, tool_mm, nowhere)
-        for path in (ring, first):
+        for path in self.been:
             self.cleared.add(moves_along(path, tool_mm)[0])
 
     def run(self) -> None:
@@ -282,7 +284,10 @@ class Pursued:
         tell_share("strokes", min(self.pursuit.cleared_mm2 / self.reach_mm2, 1.0))
 
     def link_to(self, pose: tuple[float, float, float], turn_mm: float) -> Approach | None:
-        """Return a free way from where the tool is to a pose."""
+        """Return a free way from where the tool is to a pose; None where there is none, or it is
+        not down yet."""
+        if not self.stays:
+            return None
         thick_mm = min(LINK_THICK_SHARE * self.tool_mm, self.thick_mm)
         link = self.pursuit.link(self.pose, pose, turn_mm, LINK_SHARE, thick_mm)
         if link is None:

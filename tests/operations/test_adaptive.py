@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import ezdxf
@@ -14,9 +15,10 @@ from hypothesis import strategies as st
 
 import camtool
 from camtool.errors import OptionError
+from camtool.geometry.measure import sample
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polyline, Polylines
-from camtool.planning.adaptive import adaptive_legs, spiral
+from camtool.planning.adaptive import FrontStroke, _Clearing, adaptive_legs, spiral
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry, Job, Operation, Tool
 from camtool.planning.pursuing import TURN_SHARE, Approach, Pursued
@@ -307,6 +309,37 @@ def test_a_pursuit_that_leaves_much_is_given_up(
     assert (legs != legs_of_fronts) == is_pursued
 
 
+@examples(20)
+@given(st.integers(1, 60), st.integers(1, 12), st.integers(0, 10_000))
+def test_strokes_wait_for_all_older_ones_near_them(count: int, fronts: int, seed: int) -> None:
+    """Not each by itself, which were as many as the square of the fronts (18 GB of pairs)."""
+    rng = np.random.default_rng(seed)
+    starts = rng.uniform(0.0, 12.0, (count, 2))
+    ends = starts + rng.uniform(-3.0, 3.0, (count, 2))
+    strokes = [
+        FrontStroke(np.insert(np.array([one, other]), 2, 0.0, axis=1), int(front), 1.0)
+        for one, other, front in zip(starts, ends, rng.integers(0, fronts, count), strict=True)
+    ]
+    clearing = _Clearing(offset_shape(Polylines.of([SQUARE]), 1.0), 1.0, 1.0)
+    clearing.take(strokes)
+    waits, followers = clearing.older_ones()
+    before = [set[int]() for _ in strokes]
+    for number in sorted(range(count), key=lambda each: strokes[each].front):
+        for follower in followers[number]:
+            before[follower] |= before[number] | {number}
+            waits[follower] -= 1
+    cells = [
+        {tuple(place) for place in np.floor(sample(Polyline(each.vertices), 1.0) / 2.0).tolist()}
+        for each in strokes
+    ]
+    for number, other in product(range(count), repeat=2):
+        gaps = [max(abs(a - c), abs(b - d)) for a, b in cells[number] for c, d in cells[other]]
+        is_older = strokes[other].front < strokes[number].front
+        assert (is_older and min(gaps) <= 1.0) <= (other in before[number])
+        assert (other in before[number]) <= is_older
+    assert waits == [0] * count
+
+
 def test_chambers_behind_a_neck_are_cleared_one_by_one() -> None:
     """A neck 3 % wider than the tool: by discs that fit through it the second chamber would take
     19 m of cuts, and the first one takes 0.7 m."""
@@ -328,7 +361,7 @@ def pursued(path: Polyline, tool_mm: float, limit: float) -> Pursued:
     region = offset_shape(region_of([path]), tool_mm)
     ring = np.array([[5.5, 5.0, 1.0], [4.5, 5.0, 1.0], [5.5, 5.0, 0.0]])
     first = spiral(np.array([5.0, 5.0]), 0.5, 2.0, tool_mm, limit)
-    return Pursued(region, ring, first, tool_mm, limit, TURN_SHARE)
+    return Pursued(region, [ring], first, tool_mm, limit, TURN_SHARE)
 
 
 def test_a_stroke_counts_only_if_the_way_to_it_stays_in_the_region() -> None:
@@ -354,10 +387,15 @@ def test_a_square_corner_takes_few_arcs() -> None:
     assert len(pursuit.stock_left()) == 0
 
 
-@pytest.mark.parametrize(("has_air", "parts"), [(False, ["strokes"]), (True, ["fronts", "links"])])
-def test_planning_tells_which_share_is_cleared_and_linked(has_air: bool, parts: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("room_share", "parts"), [(0.1, ["strokes"]), (math.inf, ["fronts", "links"])]
+)
+def test_planning_tells_which_share_is_cleared_and_linked(
+    room_share: float, parts: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Each part of the stage grows, and ends at all; then the stage is that of before. Pockets
-    that begin in air are cleared by fronts."""
+    without room for a pursuit are cleared by fronts."""
+    monkeypatch.setattr("camtool.planning.adaptive.PURSUED_ROOM_SHARE", room_share)
     told: list[tuple[str, float]] = []
 
     class Told(Progress):
@@ -368,13 +406,7 @@ def test_planning_tells_which_share_is_cleared_and_linked(has_air: bool, parts: 
 
     progress = Told()
     progress.begin("planning")
-    limit = math.acos(1.0 - 2.0 * 0.2)
-    if has_air:
-        region = offset_shape(region_of([SQUARE]), 0.65)
-        air = Polylines.of([moved(SQUARE, 9.0, 0.0)])
-        adaptive_legs(region, 0.3, 0.65, limit, air)
-    else:
-        adaptive(QUICK["square"], 1.3, limit)
+    adaptive(QUICK["square"], 1.3, math.acos(1.0 - 2.0 * 0.2))
     stages = [f"planning – {part}" for part in parts]
     assert list(dict.fromkeys(stage for stage, _ in told)) == stages
     for part in parts:

@@ -20,7 +20,10 @@ from hypothesis import strategies as st
 
 from camtool.errors import CamtoolError
 from camtool.findings import Finding
-from camtool.geometry.polylines import Polyline
+from camtool.geometry.offset import offset_shape
+from camtool.geometry.polylines import Polyline, Polylines
+from camtool.planning.adaptive import adaptive_legs
+from camtool.planning.clearing import parts_of
 from camtool.planning.items import CutRun
 from camtool.planning.job import Entry
 from camtool.run import Run
@@ -42,7 +45,7 @@ from tests.oracles.engagement import (
     lines_of,
     stays_of,
 )
-from tests.oracles.swept import area_of, gouges
+from tests.oracles.swept import SAG, area_of, gouges
 from tests.paths import moved, scaled
 from tests.planning.pocket_cases import cross, region_of, runs_of, shapes, work_of
 from tests.strategies import examples
@@ -72,6 +75,9 @@ STEPS_WIDE = 30.0
 """Near arcs whose radius is less than so many times what the slides go beside their path, steps of
 the machine are not small beside the advance of each turn, and short lines head where rounding
 leads them: there limits may be exceeded a little, and findings may say so without cause."""
+
+SLACK_SHARE = 3e-4
+"""Paths may leave the region of tool centres by this part of the tool's radius."""
 
 WALL_MM = 2.2e-3
 """Programs are rounded: they may cut so much into a wall. The ends and the centre of an arc are
@@ -285,6 +291,57 @@ def test_random_pockets_are_cleared_within_their_limit(case: Case, phase: float)
 @given(st.one_of(cases(250.0), narrow_cases()), st.floats(0.0, 1.0))
 def test_many_random_pockets_are_cleared_within_their_limit(case: Case, phase: float) -> None:
     assert faults(case, 0.15, phase) == []
+
+
+@st.composite
+def airs(draw: st.DrawFn, case: Case) -> Polyline:
+    """A box of air over a side of a pocket, or within it."""
+    low_x, low_y, high_x, high_y = area_of(region_of(case.paths)).bounds
+    wide, high = high_x - low_x, high_y - low_y
+    x, y = low_x + draw(st.floats(0.0, 0.9)) * wide, low_y + draw(st.floats(-1.0, 0.5)) * high
+    right = x + draw(st.sampled_from([0.3, 2.0])) * wide
+    top = y + draw(st.sampled_from([0.5, 3.0])) * high
+    return closed((x, y), (right, y), (right, top), (x, top))
+
+
+def air_faults(case: Case, air: Polyline, every: float, phase: float) -> list[str]:
+    """Return the faults of a pocket a part of which is air at the beginning."""
+    radius, area = case.radius_mm, area_of(region_of(case.paths))
+    stock = Stock(radius, radius * thick_share(case))
+    words, stays = list[str](), list[Stay]()
+    is_first = list[bool]()
+    for region in parts_of(offset_shape(region_of(case.paths), radius)):
+        clearing = adaptive_legs(region, 0.5 * radius, radius, case.limit, Polylines.of([air]))
+        for number, stay in enumerate(clearing.stays):
+            rows = [np.insert(leg.vertices, 2, -1.0, axis=1) for leg in stay]
+            points = np.concatenate([chords_of(each, CHORD_SHARE * radius) for each in rows])
+            moved_on = np.append(True, np.hypot(*np.diff(points[:, :2], axis=0).T) > 1e-9)
+            stays.append(Stay(points[moved_on][:, :2], np.empty((0, 3))))
+            is_first.append(number == 0 and clearing.helix_mm > 0.0)
+    slack = SLACK_SHARE * radius + SAG * float(np.ptp(region_of(case.paths).vertices[:, :2]))
+    centres = shapely.buffer(area, slack - radius, quad_segs=400)
+    for stay in stays:
+        if not shapely.covers(centres, shapely.LineString(stay.points)):
+            words.append("leaves the region")
+    hole = shapely.Polygon(air.vertices[:, :2])
+    for cell in stock.cells(np.reshape(area.bounds, (2, 2)), 3.0 * radius):
+        stock.content[cell] = shapely.difference(stock.of(cell), hole)
+    wide = wide_centres(case, NARROW_SLACK)
+    for place in engagements(stock, stays, every * radius, phase):
+        if is_first[place.stay] and place.travelled_mm <= math.tau * radius:
+            continue
+        limit = DOWN_RAD if math.isnan(place.heading) else TOLERATED * case.limit
+        if place.angle > limit and shapely.intersects_xy(wide, place.x, place.y):
+            words.append(_words(place, case.limit))
+    return words + uncut(case, stock)
+
+
+@examples(3, nightly=40)
+@given(cases(20.0), st.data(), st.floats(0.0, 1.0))
+def test_random_pockets_that_begin_in_air_keep_their_limit(
+    case: Case, data: st.DataObject, phase: float
+) -> None:
+    assert air_faults(case, data.draw(airs(case)), 0.3, phase) == []
 
 
 def test_rings_are_seen_to_exceed_a_limit_and_to_slot() -> None:
