@@ -274,7 +274,9 @@ class LinuxcncSamples(CountedSamples):
         lengths = np.where(moves.row_of >= 0, self._row_length, 0.0)
         self._by_rows = np.cumsum(np.append(passed_mm[0], lengths))
         self._by_moves = np.cumsum(np.append(passed_mm[1], moves.length))
-        self._into = self._by_rows[1:] - lengths - self._by_moves[np.maximum(moves.row_of, 0)]
+        into = self._by_rows[1:] - lengths - self._by_moves[np.maximum(moves.row_of, 0)]
+        # Sums of a long program differ in their last bits; before its start no move is blended.
+        self._into = np.maximum(into, 0.0)
         self._blends = None
         if corners.reach.any() or corners.before.any():
             tangent = window_plan.tangents.at_starts(moves.row)

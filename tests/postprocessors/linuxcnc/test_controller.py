@@ -2,10 +2,11 @@
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 import pytest
-from camtool_postprocessors.linuxcnc.controller import halve_arcs, merge_rows
+from camtool_postprocessors.linuxcnc.controller import LinuxcncSamples, halve_arcs, merge_rows
 from camtool_postprocessors.linuxcnc.steps import merge_lines
 from hypothesis import given
 from hypothesis import strategies as st
@@ -75,6 +76,32 @@ def test_linuxcnc_itself(case: Measured) -> None:
     ]
     for found, wanted in zip(left, case.corners_um, strict=False):
         assert found == pytest.approx(wanted, abs=0.2)
+
+
+@pytest.mark.parametrize("passed_mm", [(0.0, 0.0), (700.0, 700.0 + 6e-11), (700.0 + 6e-11, 700.0)])
+def test_no_place_is_lost_on_blends_far_into_a_program(
+    passed_mm: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A blend replaces all of a line of 1 µm. Behind 6,000 moves the sums of the lengths of rows
+    and of moves differed in their last bits, and that line began before its own start."""
+
+    class Later(LinuxcncSamples):
+        def __init__(self, *given: Any) -> None:
+            super().__init__(*given[:-1], passed_mm)
+
+    monkeypatch.setattr("camtool_postprocessors.linuxcnc.controller.LinuxcncSamples", Later)
+    program = """G17 G21 G90 G91.1 G94 G64 P0.01
+        G1 X0.461 Y1.550 F500
+        G3 X0.450 Y1.539 I0.000 J-0.011
+        X0.467 Y1.533 I0.010 J0.000
+        G1 X0.468 Y1.534
+        G3 X0.461 Y1.550 I-0.007 J0.006
+        X0.450 Y1.539 I0.000 J-0.011
+        M2
+    """
+    machine = load_target("linuxcnc").machine
+    rows = run(read(program, machine), machine)
+    assert all(np.isfinite(row.commanded).all() for row in rows)
 
 
 @pytest.mark.parametrize("case", MODES, ids=lambda case: case.program)
