@@ -426,7 +426,7 @@ def job_faults(case: Case, target: LoadedTarget, folder: Path) -> list[str]:
 
 
 def greatest_on_slides(run: Run, case: Case, at_mm: tuple[float, float]) -> tuple[float, float]:
-    """Return the greatest engagement, by the oracle, of the slides near a place behind the entry,
+    """Return the greatest engagement, by the oracle, of the slides near a place behind entries,
     and how far the slides go beside their path, mm."""
     slides = slide_moves(run.decoded, run.target, tools_of_rows(run.decoded, run.job))
     radius, lines = case.radius_mm, [list[list[float]]()]
@@ -437,6 +437,7 @@ def greatest_on_slides(run: Run, case: Case, at_mm: tuple[float, float]) -> tupl
             continue
         lines[-1] += [end] if lines[-1] else [start, end]
     stays = stays_of([np.array(line) for line in lines if line], -1.0)
+    is_helix = [bool(np.ptp(stay.down[:, :2], axis=0).max(initial=0.0) > 0.0) for stay in stays]
     stock = Stock(radius, max(thick_share(case) * radius, 2.0 * slides.beside_mm))
     near = NEAR_SHARE * radius
     places = engagements(stock, stays, 3.0 * radius, 0.5, (*at_mm, near))
@@ -444,7 +445,7 @@ def greatest_on_slides(run: Run, case: Case, at_mm: tuple[float, float]) -> tupl
         place.angle
         for place in places
         if math.dist((place.x, place.y), at_mm) < near
-        and place.travelled_mm > math.tau * radius * (place.stay == 0)
+        and place.travelled_mm > math.tau * radius * is_helix[place.stay]
     ]
     return max(angles, default=0.0), slides.beside_mm
 
