@@ -105,8 +105,9 @@ WALL_SHARE = 1e-4
 LEAD_SHARES = (1.0, 0.5, 0.25)
 """Radii of the half circles that are tried from there, over the widest."""
 
-SKIM_SHARE = 0.4
-"""A stroke along a wall begins and ends so far from the skin that it cuts, over the radius."""
+SKIM_SHARES = (0.4, 1.2)
+"""A stroke along a wall begins and ends so far from the skin that it cuts, over the radius: first
+beside thin skins, then beside all others."""
 
 SKIMMED_SHARE = 0.85
 """Walls are looked at for skins where at least this part is cleared: fewer is given up."""
@@ -216,7 +217,8 @@ class Pursued:
         for share in self.turn_shares:
             self.pursue(share * self.tool_mm)
             self.cut_corners(corners)
-        self.skim_walls()
+        for share in SKIM_SHARES:
+            self.skim_walls(share * self.tool_mm)
         tell_share("strokes", None)
 
     def stays_within(self, path: Floats) -> bool:
@@ -361,8 +363,9 @@ class Pursued:
         wider_mm = BACK_SHARE * self.tool_mm * math.tan(0.5 * before.angle)
         return corner.disc(min(before.radius + wider_mm, corner.first.radius)) or before
 
-    def skim_walls(self) -> None:
-        """Cut along walls what is left as a skin beside them, if not much is left elsewhere."""
+    def skim_walls(self, far_mm: float) -> None:
+        """Cut along walls what is left as a skin beside them, if not much is left elsewhere, and
+        so far before and behind it."""
         walls = list(MeasuredPaths(self.region))
         points = self.stock_left()
         if len(points) == 0 or self.pursuit.cleared_mm2 < SKIMMED_SHARE * self.reach_mm2:
@@ -372,7 +375,7 @@ class Pursued:
         for number, wall in enumerate(walls):
             own = points[of_wall == number]
             lengths = np.sort([wall.nearest_to((x, y)) for x, y in own.tolist()])
-            for low, high in stretches(lengths, wall, SKIM_SHARE * self.tool_mm):
+            for low, high in stretches(lengths, wall, far_mm):
                 stroke = wall.piece(low, high)
                 approach = self.approach_to(stroke, TURN_SHARE * self.tool_mm)
                 if approach is not None:
