@@ -36,6 +36,7 @@ from camtool.planning.strokes import (
     ends_of,
     left_of,
     moves_along,
+    thick_share,
 )
 from camtool.progress import tell_share
 
@@ -68,9 +69,6 @@ FIT_SHARE = 1e-4
 
 SLACK_SHARE = 2.4e-4
 """... and leave the region by no more than this; it is that much farther from the walls."""
-
-THICK_OF_STEP = 0.2
-"""Chips thinner than this part of the step beside a straight wall do not count at small limits."""
 
 SKIN_SHARE = 6e-3
 SKIN_OF_STEP = 0.3
@@ -186,14 +184,14 @@ class Pursued:
         self.region, self.tool_mm, self.limit = region, tool_mm, limit
         self.been = [*been, *([] if first is None else [first])]
         step = 1.0 - math.cos(limit)
-        self.thick_mm = min(THICK_SHARE, THICK_OF_STEP * step) * tool_mm
+        self.thick_mm = thick_share(limit) * tool_mm
         boxes = path_extents(region)
-        self.extents = np.stack([boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)])
+        extents = np.stack([boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)])
         margin_mm = MARGIN_SHARE * tool_mm
         self.pursuit = Pursuit(
             pieces_of(offset_shape(region, -margin_mm)),
             margin_mm,
-            self.extents,
+            extents,
             tool_mm,
             limit,
             0.5 * self.thick_mm,
@@ -206,7 +204,7 @@ class Pursued:
         self.pursuit.leave_out(~inside(self.pursuit.ends(), Segments.of(region)))
         self.pose = self.pursuit.pose(self.pursuit.size - 1)
         nowhere = np.array([-np.inf, -np.inf, np.inf, np.inf])
-        self.cleared = Cleared(self.extents, tool_mm, nowhere)
+        self.cleared = Cleared(extents, tool_mm, nowhere)
         for path in self.been:
             self.cleared.add(moves_along(path, tool_mm)[0])
 
@@ -366,9 +364,11 @@ class Pursued:
     def skim_walls(self, far_mm: float) -> None:
         """Cut along walls what is left as a skin beside them, if not much is left elsewhere, and
         so far before and behind it."""
-        walls = list(MeasuredPaths(self.region))
+        if self.pursuit.cleared_mm2 < SKIMMED_SHARE * self.reach_mm2:
+            return
         points = self.stock_left()
-        if len(points) == 0 or self.pursuit.cleared_mm2 < SKIMMED_SHARE * self.reach_mm2:
+        walls = list(MeasuredPaths(self.region)) if len(points) else []
+        if not walls:
             return
         away = [points_to_segments(points, wall.segments).min(axis=1) for wall in walls]
         of_wall = np.argmin(away, axis=0)

@@ -32,7 +32,16 @@ SAGITTA_SHARE = 1e-3
 """Chords of arcs, on which engagement is judged, are within this part of the tool's radius."""
 
 THICK_SHARE = 4e-3
-"""Chips thinner than this part of the tool's radius are no engagement."""
+THICK_OF_STEP = 0.2
+"""Chips thinner than the first part of the tool's radius are no engagement, nor those thinner than
+the second part of the step beside a straight wall, whichever is less."""
+
+
+def thick_share(limit_rad: float) -> float:
+    """Return the thickness, as a share of the tool's radius, up to which chips do not count where
+    the engagement has this limit; 0: none."""
+    step = 1.0 - math.cos(limit_rad)
+    return min(THICK_SHARE, THICK_OF_STEP * step) if limit_rad else THICK_SHARE
 
 
 def step_for(engagement_rad: float, opening_mm: float, radius_mm: float) -> float:

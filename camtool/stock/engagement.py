@@ -19,6 +19,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding
 from camtool.kernels.engagement import Cleared
+from camtool.planning.strokes import thick_share
 from camtool.stock.findings import (
     ENGAGEMENT_KEPT,
     ENGAGEMENT_TOO_HIGH,
@@ -28,14 +29,9 @@ from camtool.stock.findings import (
 from camtool.stock.moves import StockMoves
 from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
 
-THICK_SHARE = 4e-3
-THICK_OF_STEP = 0.2
-"""Chips thinner than THICK_SHARE of the tool's radius do not count as engagement, nor those
-thinner than this share of the step beside a straight wall, whichever is less, ..."""
-
 THICK_BESIDE = 2.0
-"""... nor those thinner than this many times the distance of the slides from the moves: they
-cannot be told from the steps of the axes."""
+"""Chips thinner than this many times the distance of the slides from the moves do not count
+either (`thick_share`): they cannot be told from the steps of the axes."""
 
 LEVEL_MM = 0.02
 """Cuts up to this much above a move count as having cleared its depth."""
@@ -185,7 +181,7 @@ def engagement_of(
         result[part] = cleared.judge(
             rows[part],
             np.ones(len(part), dtype=np.bool_),
-            max(_thick_share(limit[own]) * narrow_mm, THICK_BESIDE * moves.beside_mm),
+            max(thick_share(limit[own]) * narrow_mm, THICK_BESIDE * moves.beside_mm),
             limit[own],
             coarse_rad if limits is None else FINE_RAD,
             coarse_rad=coarse_rad,
@@ -222,13 +218,6 @@ def _entry_remaining(down: Bools, length: Floats, radius: Floats) -> Floats:
     travelled = np.concatenate([[0.0], np.cumsum(length)])
     last = np.maximum.accumulate(np.where(down, travelled[1:], -np.inf))
     return np.asarray(last + ENTRY_TURNS * 2.0 * np.pi * radius - travelled[:-1])
-
-
-def _thick_share(limit_rad: float) -> float:
-    """Return the chip thickness, as a share of the tool's radius, up to which chips do not count;
-    `limit_rad` 0: no limit."""
-    step = 1.0 - float(np.cos(limit_rad))
-    return min(THICK_SHARE, THICK_OF_STEP * step) if limit_rad else THICK_SHARE
 
 
 def _behind(down: Bools, length: Floats, radius: Floats) -> Bools:

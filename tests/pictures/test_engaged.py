@@ -23,9 +23,10 @@ from camtool.pictures.viewer.columns import ENTRY_DEG
 from camtool.pictures.viewer.page import viewer_page
 from camtool.planning.job import Entry, Job, Operation, Tool
 from camtool.planning.plan import planned
+from camtool.planning.strokes import THICK_SHARE
 from camtool.records import replace
 from camtool.stock.cutters import CutterProfile
-from camtool.stock.engagement import COARSE_RAD, THICK_SHARE, engagement_of
+from camtool.stock.engagement import COARSE_RAD, engagement_of
 from camtool.stock.moves import stock_moves_of_toolpath
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder

@@ -15,9 +15,10 @@ import camtool
 from camtool.cli.options import engagement_limit
 from camtool.errors import OptionError
 from camtool.planning.job import Job, Operation, Stock, Tool
+from camtool.planning.strokes import THICK_SHARE
 from camtool.run import Run
 from camtool.stock.cutters import CutterProfile
-from camtool.stock.engagement import THICK_SHARE, engagement_of
+from camtool.stock.engagement import engagement_of
 from camtool.stock.slides import ToolsOfRows, slide_moves
 from tests.strategies import examples
 
