@@ -26,7 +26,7 @@ that leaves no more than the tolerance in a square corner.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice, pairwise, product
 
 import numpy as np
@@ -61,7 +61,7 @@ from camtool.planning.items import CutRun, Setting
 from camtool.planning.job import Operation
 from camtool.planning.naming import key_of
 from camtool.planning.paths import MeasuredPath
-from camtool.planning.pursuing import END_SHARE, TURN_SHARE, Pursued, discs_about
+from camtool.planning.pursuing import END_SHARE, TIGHT_TURN_SHARE, TURN_SHARE, Pursued, discs_about
 from camtool.planning.ramps import feeds_along, helix
 from camtool.planning.strategies import STRATEGIES
 from camtool.planning.strokes import (
@@ -150,7 +150,7 @@ WALL_SHARE = 1e-4
 TRIED_STROKES = 4
 """So many strokes are tried before the tool comes up."""
 
-PURSUED_ROOM_SHARE = 0.1
+PURSUED_ROOM_SHARE = TIGHT_TURN_SHARE
 """Regions with less room than this part of the tool's radius are not pursued: the tightest turn
 of a pursuit has no room there."""
 
@@ -162,7 +162,7 @@ necks (19 m of cuts for 400 mm² behind a neck 3 % wider than the tool)."""
 NARROW_SHARE = 1.0
 """In regions with less room than this part of the tool's radius ..."""
 
-NARROW_TURN_SHARES = (0.5, 0.15)
+NARROW_TURN_SHARES = (TURN_SHARE, 0.15)
 """... these tightest turns, over the tool's radius, are tried, and the quicker plan is kept: of 22
 random ones the tight turn was quicker in 12, by up to 0.28, and slower by up to 0.56 elsewhere."""
 
@@ -350,10 +350,10 @@ class _Clearing:
                 return True
         return False
 
-    def add_air(self, clear: Polylines) -> None:
-        """Take it that the tool has been at all places of a region."""
-        for ring in _rings_of(clear, self.tool_mm):
-            self.cleared.add(self.moves(ring))
+    def add(self, paths: Iterable[Floats]) -> None:
+        """Take it that the tool has cut along open paths (n, 3)."""
+        for path in paths:
+            self.cleared.add(self.moves(path))
 
     def moves(self, vertices: Floats, sagitta_share: float = SAGITTA_SHARE) -> Floats:
         """Return (K, 9) the moves of an open path, as `camtool.kernels.engagement` wants them."""
@@ -540,8 +540,8 @@ def adaptive_legs(
     """
     clear = _places_in_air(air, tool_mm)
     clearing = _Clearing(region, tool_mm, limit)
-    clearing.add_air(clear)
-    been = list(_rings_of(clear, tool_mm))
+    been = list(rings_of(clear, tool_mm))
+    clearing.add(been)
     min_mm = MIN_HELIX_MM + MIN_ROOM_SHARE * tool_mm
     centre, widest_mm = _widest(region)
     room = widest_mm
@@ -572,13 +572,14 @@ def adaptive_legs(
             )
             begin_mm *= FIRST_SHARE
         first = spiral(centre, begin_mm, room, tool_mm, limit)
-        clearing.cleared.add(clearing.moves(np.array(_ring(centre, begin_mm))))
+        ring = np.array(_ring(centre, begin_mm))
+        clearing.add([ring])
         opening = FIRST_SHARE * room
         clear = Polylines.of([_circle(centre, room)])
     plans, is_complete = list[list[list[Leg]]](), False
     if widest_mm >= PURSUED_ROOM_SHARE * tool_mm:
         if helix:
-            been.append(np.array(_ring(centre, begin_mm)))
+            been.append(ring)
         begin = first if helix else None
         plans, is_complete = _plans_by_pursuit(region, been, begin, widest_mm, tool_mm, limit)
     if not is_complete:
@@ -647,8 +648,7 @@ def _completed(pursuit: Pursued, points: Floats) -> list[list[Leg]] | None:
         strokes += fronts(part, begin, (opening, opening), tool_mm, limit, clear)
     clearing = _Clearing(region, tool_mm, limit)
     legs = [leg for stay in pursuit.stays for leg in stay]
-    for path in (*pursuit.been, *(leg.vertices for leg in legs[:-1])):
-        clearing.cleared.add(clearing.moves(path))
+    clearing.add([*pursuit.been, *(leg.vertices for leg in legs[:-1])])
     clearing.take(strokes)
     if not legs:
         return list(clearing.legs(None))
@@ -686,8 +686,7 @@ def rest_stays(
     `clear`, a union of discs of the opening's radius, after these legs; the first begins with the
     last of them."""
     clearing = _Clearing(region, tool_mm, limit)
-    for leg in legs[:-1]:
-        clearing.cleared.add(clearing.moves(leg.vertices))
+    clearing.add(leg.vertices for leg in legs[:-1])
     room = _widest(region)[1]
     opening = FIRST_SHARE * opening_mm
     clearing.take(list(fronts(region, clear, (opening, max(opening, room)), tool_mm, limit)))
@@ -713,7 +712,7 @@ def stays_of_chambers(
     return [*each[:-1], AdaptiveStays(last.centre, last.helix_mm, last_stays)]
 
 
-def _rings_of(clear: Polylines, tool_mm: float) -> Iterator[Floats]:
+def rings_of(clear: Polylines, tool_mm: float) -> Iterator[Floats]:
     """Yield open paths (n, 3) on which a tool clears all places of a region."""
     while len(clear):
         for ring in clear:

@@ -13,7 +13,7 @@ import camtool
 from camtool.geometry.measure import length
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polyline, Polylines, rotate
-from camtool.planning.adaptive import _Clearing, adaptive_legs, mirrored
+from camtool.planning.adaptive import _Clearing, adaptive_legs, mirrored, rings_of
 from camtool.planning.findings import PlanningCode
 from camtool.planning.items import CutRun, Step
 from camtool.planning.job import Entry, Job, Operation, Stock, Tool
@@ -128,7 +128,7 @@ def test_arcs_that_bulge_out_of_the_region_between_their_ends_are_no_links(
 ) -> None:
     """Arcs shorter than the steps at which a path would be sampled, at each side of a square."""
     clearing = _Clearing(Polylines.of([box(0, 0, 10, 10)]), RADIUS, LIMIT)
-    clearing.add_air(Polylines.of([box(-5, -5, 15, 15)]))
+    clearing.add(rings_of(Polylines.of([box(-5, -5, 15, 15)]), RADIUS))
     y = 10.0 + beyond_mm - 0.008
     link = np.array([[5.0, 9.0, 0.0], [5.0, y, -1.0], [5.016, y, 0.0], [5.016, 9.0, 0.0]])
     corners = link[:, 0] - 5.0 + 1j * (link[:, 1] - 5.0)
@@ -139,7 +139,7 @@ def test_arcs_that_bulge_out_of_the_region_between_their_ends_are_no_links(
 
 def test_links_begin_within_the_region() -> None:
     clearing = _Clearing(Polylines.of([box(0, 0, 10, 10), box(3, 3, 6, 6)]), RADIUS, LIMIT)
-    clearing.add_air(Polylines.of([box(-5, -5, 15, 15)]))
+    clearing.add(rings_of(Polylines.of([box(-5, -5, 15, 15)]), RADIUS))
     for x, is_clear in ((1.0, True), (4.0, False), (12.0, False)):
         assert clearing.is_clear(np.array([[x, 4.0, 0.1], [x, 5.0, 0.0]])) == is_clear
 
