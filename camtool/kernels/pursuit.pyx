@@ -194,7 +194,7 @@ cdef class Pursuit:
 
     def pursue(self, piece: int, share: float, wall_share: float, max_share: float) -> tuple[int, int, int]:
         """Cut a stroke from the end of a piece, engaged by a share of the limit, or by another one
-        is_beside walls, and never by more than `max_share`. Return the piece from where on it cuts, the
+        beside walls, and never by more than `max_share`. Return the piece from where on it cuts, the
         one behind its last, and how it ended. It is undone by `undo`."""
         cdef Spot at, next_at, middle
         cdef Int first = self.count, before = piece, last_cut = self.count, first_cut = -1

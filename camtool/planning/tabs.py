@@ -126,7 +126,7 @@ class Tab(Struct, frozen=True):
 
 
 class Span(Struct, frozen=True, eq=False):
-    """What tabs span in slots wider than the tool: its centre gets up to `left_mm` to the left of
+    """The slot wider than the tool that tabs span: its centre gets up to `left_mm` to the left of
     the contour and `right_mm` to the right. `walls`: the paths of the centre along all other walls
     and lines that the slots follow, None without any. `corner_mm`: bridges count as wider by twice
     this, so that a later pass keeps out of the corners beside them."""

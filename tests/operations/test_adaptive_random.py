@@ -52,7 +52,7 @@ from tests.strategies import examples
 
 TOLERATED = 1.02
 NEAR_SHARE = 0.1
-"""What is about a place is so near, over the tool's radius."""
+"""Moves up to this part of the tool's radius away are about a place."""
 
 THICK_SHARE = 4e-3
 """As the documentation says; ..."""
